@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <exception>
@@ -55,6 +56,17 @@ Result refuse(std::string_view why, Result result) noexcept {
   return result;
 }
 
+/// @param rate_hz NaN: that in the file
+torsio_estimator* loaded(const char* path, const char* expected_serial, double rate_hz) noexcept {
+  if (path == nullptr) return refuse("the path is NULL", static_cast<torsio_estimator*>(nullptr));
+  return guarded(
+      [&] {
+        return new torsio_estimator{torsio::load_estimator(
+            path, {.rate_Hz = rate_hz, .serial = std::string(text_or_empty(expected_serial))})};
+      },
+      nullptr);
+}
+
 constexpr std::string_view kNoEstimator = "the estimator is NULL: was its load checked?";
 constexpr std::string_view kNullPointer = "a pointer is NULL";
 
@@ -97,18 +109,14 @@ const char* torsio_fault_name(int32_t fault) {
 }
 
 torsio_estimator* torsio_load(const char* path, const char* expected_serial) {
-  return torsio_load_at_rate(path, expected_serial, torsio::kNotMeasured);
+  return loaded(path, expected_serial, torsio::kNotMeasured);
 }
 
 torsio_estimator* torsio_load_at_rate(const char* path, const char* expected_serial,
                                       double rate_hz) {
-  if (path == nullptr) return refuse("the path is NULL", static_cast<torsio_estimator*>(nullptr));
-  return guarded(
-      [&] {
-        return new torsio_estimator{torsio::load_estimator(
-            path, {.rate_Hz = rate_hz, .serial = std::string(text_or_empty(expected_serial))})};
-      },
-      nullptr);
+  if (!(std::isfinite(rate_hz) && rate_hz > 0.0))
+    return refuse("the rate is not a positive number", static_cast<torsio_estimator*>(nullptr));
+  return loaded(path, expected_serial, rate_hz);
 }
 
 torsio_estimator* torsio_load_bytes(const void* bytes, size_t size, const char* expected_serial) {

@@ -66,3 +66,33 @@ void bind_learning(py::module_& module);
 void bind_control(py::module_& module);
 
 }  // namespace torsio::python
+
+namespace pybind11::detail {
+
+/// `__new__` alone, as by mocks and subclasses without `super().__init__()`, makes an object without a C++
+/// value; pybind11 would give the methods memory without contents.
+template <class T>
+struct InitialisedCaster : type_caster_base<T> {
+  bool load(handle source, bool convert) {
+    if (PyObject_TypeCheck(source.ptr(), reinterpret_cast<PyTypeObject*>(
+                                             get_type_handle(typeid(T), false).ptr())) != 0) {
+      auto* const object = reinterpret_cast<instance*>(source.ptr());
+      if (object->get_value_and_holder().value_ptr() == nullptr)
+        throw type_error(
+            std::string(Py_TYPE(source.ptr())->tp_name) +
+            ": the object was not initialised: call __init__, or the function that makes it");
+    }
+    return type_caster_base<T>::load(source, convert);
+  }
+};
+
+template <>
+struct type_caster<torsio::python::Model> : InitialisedCaster<torsio::python::Model> {};
+template <>
+struct type_caster<torsio::Recording> : InitialisedCaster<torsio::Recording> {};
+template <>
+struct type_caster<torsio::Dataset> : InitialisedCaster<torsio::Dataset> {};
+template <>
+struct type_caster<torsio::Estimate> : InitialisedCaster<torsio::Estimate> {};
+
+}  // namespace pybind11::detail

@@ -99,3 +99,11 @@ struct PythonEstimator {
 [[nodiscard]] double rate_of(const ModelFile& file, std::optional<double> rate_Hz);
 
 }  // namespace torsio::python
+
+namespace pybind11::detail {
+
+template <>
+struct type_caster<torsio::python::PythonEstimator>
+    : InitialisedCaster<torsio::python::PythonEstimator> {};
+
+}  // namespace pybind11::detail

@@ -132,3 +132,15 @@ def test_equal_simulations_are_equal():
     a = torsio.simulate("dfki-50", "sweep", seed=3, duration_s=2.0)
     b = torsio.simulate("dfki-50", "sweep", seed=3, duration_s=2.0)
     np.testing.assert_array_equal(a["torque_Nm"], b["torque_Nm"])
+
+
+def test_masked_values_are_not_measured():
+    torque = np.ma.masked_array([0.0, 999.0, 2.0, 3.0], mask=[False, True, False, False])
+    read = torsio.Recording.from_dict({"torque_Nm": torque}, rate_Hz=1000.0)["torque_Nm"]
+    assert np.array_equal(read, [0.0, np.nan, 2.0, 3.0], equal_nan=True)
+
+
+@pytest.mark.parametrize("kind", [torsio.Model, torsio.Recording, torsio.Dataset, torsio.Estimator, torsio.Estimate])
+def test_an_object_that_was_not_initialised_is_an_error(kind):
+    with pytest.raises(TypeError, match="not initialised"):
+        repr(kind.__new__(kind))

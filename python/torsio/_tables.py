@@ -15,7 +15,8 @@ from ._core import Recording, UsageError
 def _column(name: Any, values: Any) -> tuple[str, Any]:
     if not isinstance(name, str) or not name:
         raise UsageError(f"column {name!r}: expected a name with its unit, such as torque_Nm")
-    array = np.asarray(values)
+    # What is masked was not measured.
+    array = np.ma.filled(np.ma.asarray(values, np.float64), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
     if array.dtype.kind in "mM":
         raise UsageError(f"{name}: expected numbers, found {array.dtype}; give the time as t_s in seconds")
     if array.dtype.kind == "O":

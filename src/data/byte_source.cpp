@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -62,6 +63,10 @@ class FileBytes final : public ByteSource {
     struct stat info {};
     const bool is_known = fstat(descriptor_, &info) == 0;
     if (is_known && S_ISREG(info.st_mode)) bytes_ = static_cast<double>(info.st_size);
+    if (is_known && is_endless(info)) {
+      close(descriptor_);
+      throw Error({.place = path_, .expected = "a file or a pipe", .found = "a device"});
+    }
     if (is_known && S_ISDIR(info.st_mode)) {
       close(descriptor_);
       throw Error({.place = path_,
@@ -87,8 +92,20 @@ class FileBytes final : public ByteSource {
     return static_cast<std::size_t>(got);
   }
   std::string sha256() override { return sha_.hex(); }
+  [[nodiscard]] std::uint64_t bytes_read() const noexcept override {
+    return static_cast<std::uint64_t>(read_);
+  }
 
  private:
+  /// A device that is neither a terminal nor the empty one may give bytes without end.
+  [[nodiscard]] bool is_endless(const struct stat& info) const noexcept {
+    if (S_ISBLK(info.st_mode)) return true;
+    return S_ISCHR(info.st_mode) && isatty(descriptor_) == 0 &&
+           info.st_rdev != makedev(kEmptyMajor, kEmptyMinor);
+  }
+  static constexpr unsigned kEmptyMajor = 1;
+  static constexpr unsigned kEmptyMinor = 3;
+
   void report() const {
     report_progress(progress_, bytes_ > 0.0 ? std::min(read_ / bytes_, 1.0) : 0.0, "reading");
   }
@@ -109,12 +126,15 @@ class MemoryBytes final : public ByteSource {
     std::copy_n(bytes_.data(), count, out);
     sha_.add(out, count);
     bytes_.remove_prefix(count);
+    read_ += count;
     return count;
   }
   std::string sha256() override { return sha_.hex(); }
+  [[nodiscard]] std::uint64_t bytes_read() const noexcept override { return read_; }
 
  private:
   std::string_view bytes_;
+  std::uint64_t read_ = 0;
   Sha256 sha_;
 };
 
@@ -145,6 +165,7 @@ class MaybeGzip final : public ByteSource {
     return gzip_ ? unpack(out, size) : pass(out, size);
   }
   std::string sha256() override { return packed_->sha256(); }
+  [[nodiscard]] std::uint64_t bytes_read() const noexcept override { return packed_->bytes_read(); }
 
  private:
   std::size_t pass(char* out, std::size_t size) {

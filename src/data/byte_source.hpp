@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -17,6 +18,8 @@ class ByteSource {
   virtual std::size_t read(char* out, std::size_t size) = 0;
   /// SHA-256 (hex) of the bytes of the file before unpacking; call at the end.
   virtual std::string sha256() = 0;
+  /// Bytes of the file that were read, before unpacking.
+  [[nodiscard]] virtual std::uint64_t bytes_read() const noexcept = 0;
 };
 
 /// A file or pipe by path, "-" for standard input; unpacked if it starts like gzip. The progress is

@@ -122,6 +122,7 @@ std::vector<Recording> load(const Log& log, const std::string& target,
   LogTable table =
       read_log(log.path,
                {.skip = log.mapping.drop, .wanted = columns_of(log.mapping), .progress = progress});
+  const bool is_unfinished = table.is_unfinished;
   Mapping mapping = log.mapping;
   if (!needed.empty()) keep_needed(mapping, table, needed);
   std::vector<Recording> recordings =
@@ -138,6 +139,7 @@ std::vector<Recording> load(const Log& log, const std::string& target,
     }
     recording.source.file = log.entry.file;
     recording.mapping = text;
+    recording.is_unfinished = is_unfinished;
   }
   return recordings;
 }

@@ -32,6 +32,7 @@ struct LogTable {
   /// Names end in units. Where they are those of fields, only the columns that the mapping names,
   /// or that have a unit by chance, are channels.
   bool has_units = true;
+  bool is_unfinished = false;  ///< the recorder was stopped before it closed the file
 
   [[nodiscard]] std::size_t rows() const noexcept {
     return columns.empty() ? 0 : columns.front().values.size();

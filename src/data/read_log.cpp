@@ -53,6 +53,7 @@ class PeekedBytes final : public ByteSource {
     return count;
   }
   std::string sha256() override { return source_->sha256(); }
+  [[nodiscard]] std::uint64_t bytes_read() const noexcept override { return source_->bytes_read(); }
 
  private:
   std::unique_ptr<ByteSource> source_;
@@ -91,9 +92,11 @@ Format format_of(std::string_view start, const std::string& path) {
                .advice = "Save one array for each signal: numpy.savez('run.npz', **signals)"});
 }
 
-void refuse_standard_input(const std::string& path, const char* format) {
-  if (path != "-") return;
-  throw Error({.place = "standard input",
+/// For formats whose libraries open the file themselves.
+void refuse_pipe(const std::string& path, const char* format) {
+  std::error_code unknown;
+  if (path != "-" && std::filesystem::is_regular_file(path, unknown)) return;
+  throw Error({.place = path == "-" ? "standard input" : path,
                .problem = std::string(format) + " cannot be read from a pipe",
                .advice = "Give the name of the file."});
 }
@@ -158,11 +161,11 @@ class OpenMessages {
   void add(PeekedBytes& bytes, const std::string& path, const std::string& name, Format format,
            const Progress& progress) {
     if (format == Format::mcap) {
-      sources_.push_back(std::make_unique<McapRecords>(bytes, name));
+      sources_.push_back(std::make_unique<McapRecords>(bytes, name, McapLimits{}, progress));
     } else if (format == Format::bag) {
-      sources_.push_back(std::make_unique<BagRecords>(bytes, name));
+      sources_.push_back(std::make_unique<BagRecords>(bytes, name, BagLimits{}, progress));
     } else {
-      refuse_standard_input(path, "a database");
+      refuse_pipe(path, "a database");
       sources_.push_back(std::make_unique<Db3Messages>(path, progress));
     }
   }
@@ -170,6 +173,17 @@ class OpenMessages {
   std::vector<std::unique_ptr<MessageSource>> sources_;
   std::vector<NamedMessages> named_;
 };
+
+std::vector<NamedArray> read_archive(const std::string& path, ByteSource& source,
+                                     const ReadLogOptions& options) {
+  std::error_code unknown;
+  if (path != "-" && std::filesystem::is_regular_file(path, unknown)) {
+    const auto bytes = placed_bytes_of(path);
+    if (bytes->at(0, kZipMark.size()) == kZipMark)  // not packed once more
+      return read_npz(*bytes, path, options.wanted, options.progress);
+  }
+  return read_npz(source, name_of(path), options.wanted, options.progress);
+}
 
 bool has_messages(Format format) {
   return format == Format::mcap || format == Format::bag || format == Format::db3;
@@ -195,10 +209,10 @@ LogTable read_log(const std::string& path, const ReadLogOptions& options) {
     const OpenMessages messages(files, format, options.progress);
     table = table_of_messages(messages.all(), name, {.wanted = options.wanted});
   } else if (format == Format::npz) {
-    table = table_of_arrays(read_npz(*files.sources.front(), name, options.wanted), name,
-                            options.wanted);
+    table =
+        table_of_arrays(read_archive(path, *files.sources.front(), options), name, options.wanted);
   } else {
-    refuse_standard_input(path, "a MATLAB file");
+    refuse_pipe(path, "a MATLAB file");
     std::vector<NamedArray> arrays = read_mat(path, options.wanted, options.progress);
     if (!has_all(arrays, options.wanted)) arrays = read_mat(path, {}, options.progress);
     table = table_of_arrays(std::move(arrays), name, options.wanted);

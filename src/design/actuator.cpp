@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "drive_load.hpp"
 #include "sim/plant/plant.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
@@ -219,6 +220,9 @@ DriveCandidate candidate_of(const ActuatorDemand& d, const SpringDesign& spring,
   return c;
 }
 
+constexpr double kLeastLink_kg_m2 = 1e-4;
+constexpr double kLargestLink_kg_m2 = 1e4;
+
 void check(const ActuatorDemand& d) {
   const auto positive = [](const char* name, double value) {
     if (!(value > 0.0) || !std::isfinite(value))
@@ -232,7 +236,11 @@ void check(const ActuatorDemand& d) {
   positive("deflection", d.deflection_rad);
   positive("bandwidth", d.bandwidth_rad_s);
   positive("reach", d.reach_m);
-  positive("link inertia", d.link_inertia_kg_m2);
+  // A lighter link oscillates faster than a control loop, and a simulation of it takes minutes.
+  require<UsageError>(
+      d.link_inertia_kg_m2 >= kLeastLink_kg_m2 && d.link_inertia_kg_m2 <= kLargestLink_kg_m2,
+      {"actuator", "link inertia"},
+      fmt::format("{} to {} kg m2", kLeastLink_kg_m2, kLargestLink_kg_m2), d.link_inertia_kg_m2);
   positive("contact stiffness", d.contact_stiffness_N_m);
   if (d.continuous_Nm > d.peak_Nm)
     throw UsageError(

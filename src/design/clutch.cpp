@@ -10,9 +10,13 @@
 namespace torsio {
 namespace {
 
+constexpr double kLeastSlip_Nm = 1e-3;
+constexpr double kLargestSlip_Nm = 1e5;
+
 void check(const ClutchDemand& d) {
-  require<UsageError>(d.slip_Nm > 0.0 && std::isfinite(d.slip_Nm), {"clutch", "slip torque"},
-                      "more than 0 Nm", d.slip_Nm);
+  require<UsageError>(d.slip_Nm >= kLeastSlip_Nm && d.slip_Nm <= kLargestSlip_Nm,
+                      {"clutch", "slip torque"},
+                      fmt::format("{} to {} Nm", kLeastSlip_Nm, kLargestSlip_Nm), d.slip_Nm);
   require<UsageError>(d.inner_m >= 0.0 && d.outer_m > d.inner_m && std::isfinite(d.outer_m),
                       {"clutch", "outer radius"}, "more than the inner radius, in m", d.outer_m);
   require<UsageError>(d.least_friction > 0.0 && d.least_friction <= d.friction,

@@ -15,7 +15,8 @@ template <class Json>
 [[nodiscard]] std::string json_text(const Json& document) {
   Json versioned{{"schema_version", kJsonSchemaVersion}};
   versioned.update(document);
-  return versioned.dump(2) + "\n";
+  // A name of a file need not be UTF-8.
+  return versioned.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace torsio

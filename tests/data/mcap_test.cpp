@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "data/mcap/mcap_records.hpp"
+#include "data/mcap_bytes.hpp"
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "data/ros/ros_schema.hpp"
@@ -22,8 +23,11 @@
 namespace torsio {
 namespace {
 
+using test::channel;
 using test::error_message;
 using test::file_bytes;
+using test::file_with;
+using test::message;
 using testing::HasSubstr;
 
 // Written by the reference implementation of MCAP: tools/recording_peers/make_mcap.mjs has the equations.
@@ -127,38 +131,6 @@ TEST(Mcap, AnyChangedByteIsAnErrorOrAnotherNumber) {
     }
   }
   EXPECT_GT(refused, whole.size() / 37 / 2);  // most of it is in chunks, which have checksums
-}
-
-template <class Number>
-std::string number(Number value) {
-  return std::string(reinterpret_cast<const char*>(&value), sizeof(value));
-}
-
-std::string text(const std::string& value) {
-  return number(static_cast<std::uint32_t>(value.size())) + value;
-}
-
-std::string record(char kind, const std::string& content) {
-  return kind + number(static_cast<std::uint64_t>(content.size())) + content;
-}
-
-std::string channel(std::uint16_t id, std::uint16_t schema, const std::string& topic,
-                    const std::string& encoding) {
-  return record('\x04', number(id) + number(schema) + text(topic) + text(encoding) + text(""));
-}
-
-std::string message(std::uint16_t id, std::int64_t time_ns, const std::string& data) {
-  return record('\x05',
-                number(id) + number(std::uint32_t{0}) + number(time_ns) + number(time_ns) + data);
-}
-
-/// A file with one channel and one message.
-std::string file_with(const std::string& schema_encoding, const std::string& definition,
-                      const std::string& encoding, const std::string& data) {
-  return std::string(kMcapMark) + record('\x01', text("") + text("")) +
-         record('\x03', number(std::uint16_t{1}) + text("p/msg/T") + text(schema_encoding) +
-                            text(definition)) +
-         channel(1, 1, "/t", encoding) + message(1, 1000, data);
 }
 
 TEST(Mcap, RowsBeforeTheFirstMessageOfAnotherTopicHaveNoValueOfIt) {

@@ -106,6 +106,9 @@ TEST(DesignedActuator, RefusesWhatContradictsItself) {
                UsageError);
   EXPECT_THROW((void)design_actuator(demand_of(30, 60, -5, 0.1), read_drives({}), "joint"),
                UsageError);
+  ActuatorDemand light = demand_of(30, 60, 60, 0.15);
+  light.link_inertia_kg_m2 = 1e-9;
+  EXPECT_THROW((void)design_actuator(light, read_drives({}), "joint"), UsageError);
 }
 
 TEST(DesignedActuator, HasAParetoPicture) {

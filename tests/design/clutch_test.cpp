@@ -59,6 +59,9 @@ TEST(Clutch, RefusesWhatCannotBe) {
   demand.inner_m = 0.008;
   EXPECT_THROW((void)design_clutch(demand), UsageError);
   demand = clutch_002();
+  demand.slip_Nm = 5e-324;
+  EXPECT_THROW((void)design_clutch(demand), UsageError);
+  demand = clutch_002();
   demand.least_friction = 0.3;
   EXPECT_THROW((void)design_clutch(demand), UsageError);
   demand = clutch_002();

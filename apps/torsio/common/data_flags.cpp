@@ -190,16 +190,30 @@ torsio::Dataset DataFlags::checked(const Load& load) const {
   }
 }
 
+void DataFlags::remark_on_end(const torsio::Recording& recording) {
+  if (recording.is_unfinished)
+    remark("warning: " + recording.name() +
+           ": the file was not closed: what follows its last whole record is missing");
+}
+
 torsio::Dataset DataFlags::read(const std::vector<std::string>& files,
                                 const std::vector<std::string>& test,
                                 const torsio::LoadOptions& options) const {
-  return checked([&] { return torsio::load_dataset(files, test, options); });
+  return checked([&] {
+    torsio::Dataset dataset = torsio::load_dataset(files, test, options);
+    for (const torsio::DatasetRecord& record : dataset.records) remark_on_end(record.recording);
+    return dataset;
+  });
 }
 
 torsio::Dataset DataFlags::load_inputs(const std::vector<std::string>& channels,
                                        const torsio::Progress& progress) const {
   require_recordings();
-  return checked([&] { return torsio::load_inputs(recordings, channels, load_options(progress)); });
+  return checked([&] {
+    torsio::Dataset dataset = torsio::load_inputs(recordings, channels, load_options(progress));
+    for (const torsio::DatasetRecord& record : dataset.records) remark_on_end(record.recording);
+    return dataset;
+  });
 }
 
 torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,

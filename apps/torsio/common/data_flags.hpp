@@ -55,6 +55,9 @@ struct DataFlags {
   void check_outputs(const std::vector<std::string>& outputs,
                      const std::vector<std::string>& more_inputs = {});
 
+  /// Prints a warning of a truncated file.
+  static void remark_on_end(const torsio::Recording& recording);
+
  private:
   void add_rate_and_joint(CLI::App& verb);
   void require_recordings() const;

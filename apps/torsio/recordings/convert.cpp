@@ -29,6 +29,7 @@ torsio::Recording read(const ConvertFlags& flags, const torsio::Progress& progre
   if (is_recorder_file(flags.input)) return torsio::read_recording_blocks(flags.input).recording;
   std::vector<torsio::Recording> recordings =
       torsio::load_recordings(flags.input, flags.data.load_options(progress));
+  DataFlags::remark_on_end(recordings.front());
   if (recordings.size() == 1) return std::move(recordings.front());
   throw torsio::Error({.place = flags.input,
                        .expected = "one recording",

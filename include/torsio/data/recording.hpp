@@ -64,6 +64,8 @@ class Recording {
   std::vector<ChannelDefinition> definitions;
   std::vector<ZeroRule> zeros;  ///< already applied to the values
   std::string mapping;  ///< `mapping_text` of the mapping that it was read with; empty: none
+  /// Its recorder was stopped before it closed the file, or the file is truncated.
+  bool is_unfinished = false;
 
  private:
   std::string name_;

@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <system_error>
 
 #include "core/report_progress.hpp"
@@ -80,6 +81,13 @@ class Child {
                .problem = fmt::format("{}: {}", what, std::generic_category().message(errno))});
 }
 
+/// What the parent has mapped, which a child inherits; 0 if it is not known.
+std::size_t own_address_space() {
+  std::size_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
 /// The child: never returns, and runs no destructors of the parent's objects.
 [[noreturn]] void run_child(const std::function<std::string(int)>& work, int results, int reasons,
                             const ChildLimits& limits) {
@@ -91,7 +99,8 @@ class Child {
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   if (kLimitsMemory) {
-    const rlimit memory{limits.memory_bytes, limits.memory_bytes};
+    const rlim_t bytes = limits.memory_bytes + own_address_space();
+    const rlimit memory{bytes, bytes};
     setrlimit(RLIMIT_AS, &memory);
   }
   if (const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0) {

@@ -12,8 +12,8 @@ namespace torsio {
 
 /// What a child process may use before the system ends it.
 struct ChildLimits {
-  std::size_t memory_bytes = std::size_t{6}
-                             << 30;  ///< address space; not limited under a sanitizer
+  /// Address space in addition to that of the parent; not limited under a sanitizer.
+  std::size_t memory_bytes = std::size_t{6} << 30;
   unsigned cpu_s = 600;
 };
 

@@ -13,6 +13,7 @@
 
 #include "data/arrays/child_process.hpp"
 #include "data/arrays/mat.hpp"
+#include "data/arrays/mat_check.hpp"
 #include "data/little_endian.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
@@ -211,8 +212,14 @@ std::string send_arrays(const std::string& path, const std::vector<std::string>&
 
 std::vector<NamedArray> read_mat(const std::string& path, const std::vector<std::string>& wanted,
                                  const Progress& progress) {
-  const ChildOutput sent = output_of_child(
-      [&](int descriptor) { return send_arrays(path, wanted, descriptor); }, path, progress);
+  ReadBudget budget(path, progress);
+  const auto file = placed_bytes_of(path);
+  verify_mat(*file, budget);
+  const auto megabytes = static_cast<unsigned>(file->size() >> 20U);
+  const ChildLimits limits{.memory_bytes = budget.memory_limit(), .cpu_s = 4 + megabytes};
+  const ChildOutput sent =
+      output_of_child([&](int descriptor) { return send_arrays(path, wanted, descriptor); }, path,
+                      progress, limits);
   LittleEndianReader reader(sent.bytes());
   std::vector<NamedArray> arrays;
   while (reader.left() > 0) {

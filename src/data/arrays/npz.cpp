@@ -23,7 +23,9 @@ namespace {
 
 constexpr std::string_view kEnding = ".npy";
 constexpr std::string_view kNumpyMark{"\x93NUMPY", 6};
-constexpr std::size_t kMaxFileBytes = std::size_t{4} << 30;
+constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
+/// The longest header that is read.
+constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 16;
 
 /// The header of an array: a Python dictionary as text.
 struct ArrayHeader {
@@ -106,16 +108,22 @@ constexpr std::array<NumberType, 11> kTypes{{{"<f8", 8, converted<double>},
                                              {"|u1", 1, converted<std::uint8_t>},
                                              {"|b1", 1, converted<std::uint8_t>}}};
 
+/// @returns why an array that begins like this is not read; empty if it is
+std::string problem_of_header(std::string_view start) {
+  const auto header = take_header(start);
+  if (!header) return "its header is not that of an array";
+  if (std::ranges::find(kTypes, header->type, &NumberType::name) == kTypes.end())
+    return fmt::format("numbers of type '{}' are not read",
+                       header->type.empty() ? "structured" : printable(header->type));
+  if (header->shape.size() > 2) return "it has more than two dimensions";
+  return {};
+}
+
 /// @returns why the array is not read; empty if its columns were added
 std::string add_array(std::vector<NamedArray>& arrays, const std::string& name,
                       std::string_view bytes) {
   const auto header = take_header(bytes);
-  if (!header) return "its header is not that of an array";
   const auto* const type = std::ranges::find(kTypes, header->type, &NumberType::name);
-  if (type == kTypes.end())
-    return fmt::format("numbers of type '{}' are not read",
-                       header->type.empty() ? "structured" : printable(header->type));
-  if (header->shape.size() > 2) return "it has more than two dimensions";
   const std::size_t rows = header->shape.empty() ? 1 : header->shape.front();
   const std::size_t columns = header->shape.size() < 2 ? 1 : header->shape.back();
   const std::size_t count = bytes.size() / type->bytes;
@@ -137,12 +145,10 @@ bool is_of(std::string_view wanted, std::string_view array) {
 
 }  // namespace
 
-std::vector<NamedArray> read_npz(ByteSource& source, const std::string& name,
-                                 const std::vector<std::string>& wanted) {
-  std::string bytes;
-  if (read_exactly(source, bytes, kMaxFileBytes))
-    throw Error({.place = name, .problem = "a file of more than 4 GiB"});
-  const ZipArchive archive(bytes, name);
+std::vector<NamedArray> read_npz(const PlacedBytes& bytes, const std::string& name,
+                                 const std::vector<std::string>& wanted, const Progress& progress) {
+  ReadBudget budget(name, progress);
+  const ZipArchive archive(bytes, budget);
   std::vector<NamedArray> arrays;
   std::size_t values = 0;
   for (const ZipMember& member : archive.members()) {
@@ -151,9 +157,13 @@ std::vector<NamedArray> read_npz(ByteSource& source, const std::string& name,
     const bool is_wanted = std::ranges::any_of(
         wanted, [&](const std::string& column) { return is_of(column, array); });
     const std::size_t before = arrays.size();
-    const std::string content =
-        archive.read(member, sizeof(double) * (kMaxArrayValues - values) + (1 << 16));
-    const std::string problem = add_array(arrays, array, content);
+    // What is not read is not unpacked either.
+    std::string problem = problem_of_header(archive.start(member, kMaxHeaderBytes));
+    if (problem.empty()) {
+      const std::string content = archive.read(member);
+      budget.keep(sizeof(double) * content.size());
+      problem = add_array(arrays, array, content);
+    }
     if (!problem.empty() && is_wanted)
       throw Error({.place = fmt::format("{}: {}", name, array),
                    .problem = problem,
@@ -164,6 +174,21 @@ std::vector<NamedArray> read_npz(ByteSource& source, const std::string& name,
       throw Error({.place = name, .problem = fmt::format("more than {} numbers", kMaxArrayValues)});
   }
   return arrays;
+}
+
+std::vector<NamedArray> read_npz(ByteSource& source, const std::string& name,
+                                 const std::vector<std::string>& wanted, const Progress& progress) {
+  std::string bytes;
+  ReadBudget budget(name, progress);
+  std::string block;
+  bool is_whole = true;
+  while (is_whole) {
+    is_whole = read_exactly(source, block, kBlockBytes);
+    budget.read_to(source.bytes_read());
+    budget.require(bytes.size() + block.size());
+    bytes += block;
+  }
+  return read_npz(*placed_bytes(bytes), name, wanted, progress);
 }
 
 void write_npz(const Recording& recording, OutputFile& file, const Progress& progress) {

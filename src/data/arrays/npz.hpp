@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "data/arrays/array_table.hpp"
+#include "data/arrays/zip_archive.hpp"
 #include "data/byte_source.hpp"
 #include "files/output_file.hpp"
 #include "torsio/core/progress.hpp"
@@ -16,8 +17,13 @@ namespace torsio {
 /// format 1.0 to 3.0.
 /// @throws Error for objects (pickles), structured, complex, half-precision and big-endian arrays
 /// and for three dimensions, if one of `wanted` is such an array; without `wanted` those are left out.
+[[nodiscard]] std::vector<NamedArray> read_npz(const PlacedBytes& bytes, const std::string& name,
+                                               const std::vector<std::string>& wanted = {},
+                                               const Progress& progress = {});
+/// The same of a pipe or a packed file, which is read into memory first.
 [[nodiscard]] std::vector<NamedArray> read_npz(ByteSource& source, const std::string& name,
-                                               const std::vector<std::string>& wanted = {});
+                                               const std::vector<std::string>& wanted = {},
+                                               const Progress& progress = {});
 
 /// An array of float64 for `t_s`, each channel, and the freshness of those that have it.
 void write_npz(const Recording& recording, OutputFile& file, const Progress& progress = {});

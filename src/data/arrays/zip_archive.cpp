@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <fstream>
 #include <limits>
 #include <optional>
 #include <span>
@@ -23,6 +24,9 @@ constexpr std::uint32_t kEnd64Mark = 0x06064b50;
 constexpr std::uint32_t kEnd64PlaceMark = 0x07064b50;
 constexpr std::size_t kEndBytes = 22;
 constexpr std::size_t kEnd64PlaceBytes = 20;
+constexpr std::size_t kEnd64Bytes = 56;
+constexpr std::size_t kMemberBytes = 30;
+constexpr std::uint64_t kBytesPerElement = 8;
 constexpr std::uint32_t kIn64Bits = 0xFFFFFFFF;  // the size is in the extra field
 constexpr std::uint16_t kExtra64 = 1;
 constexpr std::uint16_t kStored = 0;
@@ -33,27 +37,30 @@ std::uint32_t checksum(std::string_view bytes) {
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-/// Unpacks to exactly `size` bytes. @returns false if it is damaged or has another size
-bool inflated(std::string_view packed, std::uint64_t size, std::string& to) {
-  constexpr std::size_t kBlock = std::size_t{1} << 20;
+/// Unpacks up to `size` bytes. @returns false if it is damaged or, where `is_whole`, has another size
+bool inflated(std::string_view packed, std::uint64_t size, bool is_whole, std::string& to) {
+  constexpr std::size_t kBlock = std::size_t{1} << 16;
   z_stream stream{};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) return false;
   int code = Z_OK;
+  // One byte more than `size` shows that there are more.
   while (code == Z_OK && to.size() <= size) {
     const std::size_t taken = std::min<std::size_t>(packed.size(), kBlock);
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
     stream.avail_in = static_cast<uInt>(taken);
     const std::size_t before = to.size();
-    to.resize(before + kBlock);
+    to.resize(before + std::min<std::uint64_t>(kBlock, size + 1 - before));
     stream.next_out = reinterpret_cast<Bytef*>(to.data() + before);
-    stream.avail_out = static_cast<uInt>(kBlock);
+    stream.avail_out = static_cast<uInt>(to.size() - before);
     code = inflate(&stream, Z_NO_FLUSH);
     to.resize(to.size() - stream.avail_out);
     packed.remove_prefix(taken - stream.avail_in);
     if (taken == 0 && to.size() == before) break;
   }
   inflateEnd(&stream);
-  return code == Z_STREAM_END && to.size() == size;
+  if (is_whole) return code == Z_STREAM_END && to.size() == size;
+  to.resize(std::min<std::uint64_t>(to.size(), size));
+  return code == Z_STREAM_END || code == Z_OK || code == Z_BUF_ERROR;
 }
 
 /// Reads the numbers of a header; `is_whole` is false once one was missing.
@@ -98,27 +105,28 @@ struct Directory {
 };
 
 /// Where the archive's end places its directory.
-std::optional<Directory> find_directory(std::string_view bytes) {
+std::optional<Directory> find_directory(const PlacedBytes& all) {
   constexpr std::size_t kMaxComment = 0xFFFF;
+  constexpr std::uint64_t kMaxEnd = kEnd64PlaceBytes + kEndBytes + kMaxComment;
+  const std::string bytes = all.at(all.size() - std::min(all.size(), kMaxEnd), kMaxEnd);
   std::string mark;
   LittleEndianWriter(mark).number(kEndMark);
   const std::size_t at = bytes.rfind(mark);
-  if (at == std::string_view::npos || bytes.size() - at < kEndBytes ||
-      bytes.size() - at > kEndBytes + kMaxComment)
-    return std::nullopt;
-  HeaderReader end(bytes.substr(at));
+  if (at == std::string::npos || bytes.size() - at < kEndBytes) return std::nullopt;
+  HeaderReader end(std::string_view(bytes).substr(at));
   end.skip(10);
   Directory found;
   found.members = end.number<std::uint16_t>();
   end.skip(4);
   found.start = end.number<std::uint32_t>();
   if (at < kEnd64PlaceBytes) return found;
-  HeaderReader place(bytes.substr(at - kEnd64PlaceBytes));
+  HeaderReader place(std::string_view(bytes).substr(at - kEnd64PlaceBytes));
   if (place.number<std::uint32_t>() != kEnd64PlaceMark) return found;
   place.skip(4);
   const auto start64 = place.number<std::uint64_t>();
-  if (start64 > bytes.size()) return std::nullopt;
-  HeaderReader end64(bytes.substr(start64));
+  if (start64 > all.size()) return std::nullopt;
+  const std::string bytes64 = all.at(start64, kEnd64Bytes);
+  HeaderReader end64(bytes64);
   if (end64.number<std::uint32_t>() != kEnd64Mark) return std::nullopt;
   end64.skip(28);
   found.members = end64.number<std::uint64_t>();
@@ -127,14 +135,62 @@ std::optional<Directory> find_directory(std::string_view bytes) {
   return end64.is_whole() ? std::optional(found) : std::nullopt;
 }
 
+class BytesInMemory final : public PlacedBytes {
+ public:
+  explicit BytesInMemory(std::string_view bytes) : bytes_(bytes) {}
+  [[nodiscard]] std::uint64_t size() const override { return bytes_.size(); }
+  [[nodiscard]] std::string at(std::uint64_t start, std::uint64_t size) const override {
+    return start > bytes_.size() ? std::string() : std::string(bytes_.substr(start, size));
+  }
+
+ private:
+  std::string_view bytes_;
+};
+
+class BytesInFile final : public PlacedBytes {
+ public:
+  explicit BytesInFile(const std::string& path)
+      : path_(path), file_(path, std::ios::binary | std::ios::ate) {
+    if (!file_) throw Error({.place = path, .problem = "cannot be opened"});
+    size_ = static_cast<std::uint64_t>(file_.tellg());
+  }
+  [[nodiscard]] std::uint64_t size() const override { return size_; }
+  [[nodiscard]] std::string at(std::uint64_t start, std::uint64_t size) const override {
+    if (start > size_) return {};
+    std::string bytes(std::min(size, size_ - start), '\0');
+    file_.clear();
+    file_.seekg(static_cast<std::streamoff>(start));
+    file_.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    if (file_.bad()) throw Error({.place = path_, .problem = "cannot be read"});
+    bytes.resize(static_cast<std::size_t>(file_.gcount()));
+    return bytes;
+  }
+
+ private:
+  std::string path_;
+  mutable std::ifstream file_;
+  std::uint64_t size_ = 0;
+};
+
 }  // namespace
 
-ZipArchive::ZipArchive(std::string_view bytes, std::string name)
-    : bytes_(bytes), name_(std::move(name)) {
+std::unique_ptr<PlacedBytes> placed_bytes(std::string_view bytes) {
+  return std::make_unique<BytesInMemory>(bytes);
+}
+
+std::unique_ptr<PlacedBytes> placed_bytes_of(const std::string& path) {
+  return std::make_unique<BytesInFile>(path);
+}
+
+ZipArchive::ZipArchive(const PlacedBytes& bytes, ReadBudget& budget)
+    : bytes_(bytes), budget_(budget) {
+  budget.read_to(bytes.size());
   const auto directory = find_directory(bytes);
   if (!directory || directory->start > bytes.size())
     refuse("the directory at its end is missing or damaged");
-  HeaderReader reader(bytes.substr(directory->start));
+  budget.require(bytes.size() - directory->start);
+  const std::string entries = bytes.at(directory->start, bytes.size() - directory->start);
+  HeaderReader reader(entries);
   for (std::uint64_t i = 0; i < directory->members; ++i) {
     ZipMember member;
     const auto mark = reader.number<std::uint32_t>();
@@ -155,32 +211,50 @@ ZipArchive::ZipArchive(std::string_view bytes, std::string name)
     reader.skip(comment_size);
     if (!reader.is_whole() || mark != kDirectoryMark) refuse("its directory is damaged");
     if ((flags & 1U) != 0) refuse("it is encrypted");
+    budget.keep(sizeof(ZipMember) + member.name.size());
     members_.push_back(std::move(member));
   }
 }
 
 void ZipArchive::refuse(const std::string& problem) const {
-  throw Error({.place = name_, .problem = problem, .expected = "a ZIP archive"});
+  throw Error({.place = budget_.name(), .problem = problem, .expected = "a ZIP archive"});
 }
 
-std::string ZipArchive::read(const ZipMember& member, std::uint64_t max_bytes) const {
-  if (member.bytes > max_bytes)
-    refuse(
-        fmt::format("{} has {} bytes; at most {} are read", member.name, member.bytes, max_bytes));
+/// Up to `size` bytes of a member as they are in the archive.
+std::string ZipArchive::packed(const ZipMember& member, std::uint64_t size) const {
   if (member.start > bytes_.size()) refuse(member.name + " is beyond its end");
-  HeaderReader reader(bytes_.substr(member.start));
+  const std::string head = bytes_.at(member.start, kMemberBytes);
+  HeaderReader reader(head);
   const auto mark = reader.number<std::uint32_t>();
   reader.skip(22);
   const auto name_size = reader.number<std::uint16_t>();
   const auto extra_size = reader.number<std::uint16_t>();
-  reader.skip(std::size_t{name_size} + extra_size);
-  if (member.packed_bytes > reader.left()) refuse(member.name + " ends too early");
-  const std::string_view packed = reader.bytes(member.packed_bytes);
   if (!reader.is_whole() || mark != kMemberMark) refuse(member.name + " is damaged");
+  const std::uint64_t start = member.start + kMemberBytes + name_size + extra_size;
+  if (start > bytes_.size() || member.packed_bytes > bytes_.size() - start)
+    refuse(member.name + " ends too early");
+  return bytes_.at(start, std::min(size, member.packed_bytes));
+}
+
+std::string ZipArchive::start(const ZipMember& member, std::uint64_t size) const {
+  budget_.work(1 + size / kBytesPerElement);
+  const std::string first = packed(member, size);
   std::string content;
-  if (member.packing == kStored && packed.size() == member.bytes)
-    content = packed;
-  else if (member.packing != kDeflated || !inflated(packed, member.bytes, content))
+  if (member.packing == kStored)
+    content = first;
+  else if (member.packing != kDeflated || !inflated(first, size, false, content))
+    refuse(member.name + " cannot be unpacked");
+  return content;
+}
+
+std::string ZipArchive::read(const ZipMember& member) const {
+  budget_.require(member.bytes);
+  budget_.work(member.bytes / kBytesPerElement);
+  const std::string all = packed(member, member.packed_bytes);
+  std::string content;
+  if (member.packing == kStored && all.size() == member.bytes)
+    content = all;
+  else if (member.packing != kDeflated || !inflated(all, member.bytes, true, content))
     refuse(member.name + " cannot be unpacked");
   if (checksum(content) != member.checksum) refuse("the checksum of " + member.name + " is wrong");
   return content;

@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "data/read_budget.hpp"
 #include "files/output_file.hpp"
 
 namespace torsio {
@@ -23,21 +25,38 @@ struct ZipMember {
   std::uint64_t start = 0;  ///< place of its header in the archive
 };
 
-/// A ZIP archive in memory, with 64-bit sizes or without. Source: PKWARE, APPNOTE 6.3.
+/// Bytes of a file in any order.
+class PlacedBytes {
+ public:
+  virtual ~PlacedBytes() = default;
+  [[nodiscard]] virtual std::uint64_t size() const = 0;
+  /// What there is of these bytes. @throws Error if reading fails.
+  [[nodiscard]] virtual std::string at(std::uint64_t start, std::uint64_t size) const = 0;
+};
+
+/// `bytes` must outlive it.
+[[nodiscard]] std::unique_ptr<PlacedBytes> placed_bytes(std::string_view bytes);
+/// A file that is neither a pipe nor packed. @throws Error if it cannot be opened.
+[[nodiscard]] std::unique_ptr<PlacedBytes> placed_bytes_of(const std::string& path);
+
+/// A ZIP archive, with 64-bit sizes or without. Source: PKWARE, APPNOTE 6.3.
 class ZipArchive {
  public:
-  /// `bytes` must outlive the archive. @throws Error if its directory is damaged.
-  ZipArchive(std::string_view bytes, std::string name);
+  /// Both must outlive the archive. @throws Error if its directory is damaged, or beyond the budget.
+  ZipArchive(const PlacedBytes& bytes, ReadBudget& budget);
 
   [[nodiscard]] const std::vector<ZipMember>& members() const noexcept { return members_; }
-  /// @throws Error if it is damaged, encrypted, packed in another way, or larger than `max_bytes`.
-  [[nodiscard]] std::string read(const ZipMember& member, std::uint64_t max_bytes) const;
+  /// The first bytes, up to `size`, without verification. @throws Error as `read`.
+  [[nodiscard]] std::string start(const ZipMember& member, std::uint64_t size) const;
+  /// @throws Error if it is damaged, encrypted, packed in another way, or beyond the budget.
+  [[nodiscard]] std::string read(const ZipMember& member) const;
 
  private:
+  [[nodiscard]] std::string packed(const ZipMember& member, std::uint64_t size) const;
   [[noreturn]] void refuse(const std::string& problem) const;
 
-  std::string_view bytes_;
-  std::string name_;
+  const PlacedBytes& bytes_;
+  ReadBudget& budget_;
   std::vector<ZipMember> members_;
 };
 

@@ -29,8 +29,12 @@ std::string_view field_of(const std::map<std::string_view, std::string_view>& fi
 
 }  // namespace
 
-BagRecords::BagRecords(ByteSource& source, std::string name, BagLimits limits)
-    : source_(source), name_(std::move(name)), limits_(limits) {
+BagRecords::BagRecords(ByteSource& source, const std::string& name, BagLimits limits,
+                       Progress progress)
+    : MessageSource(ReadBudget(name, std::move(progress))),
+      source_(source),
+      name_(name),
+      limits_(limits) {
   std::string mark;
   if (!read(mark, kBagMark.size()) || mark != kBagMark) refuse("the first bytes are not its mark");
 }
@@ -44,6 +48,7 @@ void BagRecords::refuse(const std::string& problem) const {
 
 bool BagRecords::read(std::string& to, std::size_t size) {
   const bool is_whole = read_exactly(source_, to, size);
+  budget().read_to(source_.bytes_read());
   if (is_whole) place_ += size;
   return is_whole;
 }
@@ -96,6 +101,7 @@ bool BagRecords::next(LogMessage& message) {
     if (next_in_chunk(message)) return true;
     Record record;
     if (!read_record(record)) return false;
+    budget().work(1);
     const auto kind = number<std::uint8_t>(record, "op");
     if (kind == kBagHeader) {
       // Zero until the recorder closes the file.
@@ -115,6 +121,7 @@ bool BagRecords::next_in_chunk(LogMessage& message) {
     const auto data = reader.text<std::uint32_t>();
     if (!header || !data) refuse("a chunk ends inside a record");
     chunk_at_ += reader.at();
+    budget().work(1);
     if (take({.fields = fields_of(*header), .data = *data}, message)) return true;
   }
   return false;
@@ -140,6 +147,7 @@ void BagRecords::add_connection(const Record& record) {
   const auto fields = fields_of(record.data);
   if (connections_.size() >= limits_.connections)
     refuse(fmt::format("more than {} connections", limits_.connections));
+  budget().keep(record.data.size());
   connections_.try_emplace(
       number<std::uint32_t>(record, "conn"),
       MessageChannel{
@@ -155,6 +163,7 @@ void BagRecords::open_chunk(const Record& record) {
   const std::string_view packing = field_of(record.fields, "compression");
   if (size > limits_.record_bytes)
     refuse(fmt::format("a chunk of {} bytes; at most {} are read", size, limits_.record_bytes));
+  budget().require(size);
   chunk_at_ = 0;
   if (!unpack_chunk(packing, record.data, size, chunk_))
     refuse(fmt::format("a chunk packed by '{}' cannot be unpacked; known are {}",

@@ -25,7 +25,8 @@ struct BagLimits {
 /// at its end is not used. Chunks are plain, lz4 or bz2. Source: ROS wiki, Bags/Format/2.0.
 class BagRecords final : public MessageSource {
  public:
-  BagRecords(ByteSource& source, std::string name, BagLimits limits = {});
+  BagRecords(ByteSource& source, const std::string& name, BagLimits limits = {},
+             Progress progress = {});
 
   bool next(LogMessage& message) override;
   [[nodiscard]] bool is_unfinished() const noexcept override { return is_unfinished_; }

@@ -77,7 +77,7 @@ void refuse_binary(std::string_view line, const std::string& place) {
                               : "torsio reads CSV, plain or gzipped; convert the file first."});
 }
 
-std::string escaped(std::string_view line) {
+std::string escaped_line(std::string_view line) {
   std::string text;
   for (const char c : line.substr(0, 40))
     text += static_cast<unsigned char>(c) < 0x80
@@ -90,7 +90,7 @@ void refuse_latin(std::string_view line, const std::string& place) {
   if (is_utf8(line)) return;
   throw Error({.place = place,
                .expected = "names in UTF-8",
-               .found = "other bytes, Latin-1 for example: '" + escaped(line) + "'",
+               .found = "other bytes, Latin-1 for example: '" + escaped_line(line) + "'",
                .advice = "Save the file as UTF-8, or convert it:  iconv -f LATIN1 -t UTF-8 LOG.csv "
                          "> LOG_utf8.csv"});
 }

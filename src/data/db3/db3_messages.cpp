@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
-#include "core/report_progress.hpp"
 #include "data/names.hpp"
 #include "data/ros/common_definitions.hpp"
 #include "torsio/core/error.hpp"
@@ -15,22 +16,14 @@ namespace {
 
 constexpr int kMaxBytes = 256 << 20;  ///< largest message
 constexpr int kInstructionsPerReport = 100'000;
+/// Elements that so many instructions count as.
+constexpr std::uint64_t kWorkPerReport = 50'000;
 
 std::string text_at(sqlite3_stmt* statement, int column) {
   const unsigned char* text = sqlite3_column_text(statement, column);
   if (text == nullptr) return {};
   return {reinterpret_cast<const char*>(text),
           static_cast<std::size_t>(sqlite3_column_bytes(statement, column))};
-}
-
-/// Called by the database while it works. @returns other than 0 to stop it
-int asks_to_stop(void* progress) noexcept {
-  try {
-    report_progress(*static_cast<const Progress*>(progress), 0.0, "reading");
-    return 0;
-  } catch (...) {
-    return 1;
-  }
 }
 
 }  // namespace
@@ -42,8 +35,23 @@ void Db3Messages::Finalize::operator()(sqlite3_stmt* statement) const noexcept {
   sqlite3_finalize(statement);
 }
 
+/// Called by the database while it works. @returns other than 0 to stop it
+int Db3Messages::watch(void* self) noexcept {
+  auto& own = *static_cast<Db3Messages*>(self);
+  try {
+    own.budget().work(kWorkPerReport);
+    return 0;
+  } catch (...) {
+    own.stopped_ = std::current_exception();
+    return 1;
+  }
+}
+
 Db3Messages::Db3Messages(const std::string& path, Progress progress)
-    : path_(path), progress_(std::move(progress)) {
+    : MessageSource(ReadBudget(path, std::move(progress))), path_(path) {
+  std::error_code unknown;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
+  if (!unknown) budget().read_to(bytes);
   sqlite3* opened = nullptr;
   const int code = sqlite3_open_v2(path.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr);
   database_.reset(opened);
@@ -52,9 +60,10 @@ Db3Messages::Db3Messages(const std::string& path, Progress progress)
   // A file of unknown origin must not call functions.
   sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  sqlite3_progress_handler(opened, kInstructionsPerReport, asks_to_stop, &progress_);
+  sqlite3_progress_handler(opened, kInstructionsPerReport, watch, this);
   if (!has_table("topics") || !has_table("messages"))
     refuse("it has no tables 'topics' and 'messages'");
+  for (const char* table : {"topics", "messages", "message_definitions"}) require_plain(table);
   read_topics();
   messages_ = query("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id");
 }
@@ -65,7 +74,9 @@ void Db3Messages::refuse(const std::string& problem) const {
   throw Error({.place = path_,
                .problem = problem,
                .expected = "a database of rosbag2",
-               .found = database_ ? sqlite3_errmsg(database_.get()) : ""});
+               .found = database_ && sqlite3_errcode(database_.get()) != SQLITE_ROW
+                            ? sqlite3_errmsg(database_.get())
+                            : ""});
 }
 
 Db3Messages::Statement Db3Messages::query(const char* sql) {
@@ -78,7 +89,7 @@ Db3Messages::Statement Db3Messages::query(const char* sql) {
 bool Db3Messages::step(const Statement& statement) {
   const int code = sqlite3_step(statement.get());
   if (code == SQLITE_ROW) return true;
-  if (code == SQLITE_INTERRUPT) throw Cancelled();
+  if (stopped_) std::rethrow_exception(std::exchange(stopped_, nullptr));
   if (code != SQLITE_DONE) refuse("it cannot be read");
   return false;
 }
@@ -89,6 +100,19 @@ bool Db3Messages::has_table(const char* name) {
   return step(found);
 }
 
+// Views, virtual tables and generated columns compute what they return, by whatever the file states.
+void Db3Messages::require_plain(const char* table) {
+  const Statement made = query("SELECT sql FROM sqlite_master WHERE name = ?1");
+  sqlite3_bind_text(made.get(), 1, table, -1, SQLITE_STATIC);
+  while (step(made))
+    if (!text_at(made.get(), 0).starts_with("CREATE TABLE"))
+      refuse(fmt::format("'{}' is not an ordinary table", table));
+  const Statement columns = query("SELECT name FROM pragma_table_xinfo(?1) WHERE hidden <> 0");
+  sqlite3_bind_text(columns.get(), 1, table, -1, SQLITE_STATIC);
+  if (step(columns))
+    refuse(fmt::format("the column '{}' of '{}' is computed", text_at(columns.get(), 0), table));
+}
+
 std::map<std::string, MessageSchema, std::less<>> Db3Messages::definitions() {
   std::map<std::string, MessageSchema, std::less<>> schemas;
   if (!has_table("message_definitions")) return schemas;
@@ -96,6 +120,7 @@ std::map<std::string, MessageSchema, std::less<>> Db3Messages::definitions() {
       query("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions");
   while (step(found)) {
     const std::string name = text_at(found.get(), 0);
+    budget().keep(static_cast<std::uint64_t>(sqlite3_column_bytes(found.get(), 2)));
     schemas[name] = {escaped(name), escaped(text_at(found.get(), 1)), text_at(found.get(), 2)};
   }
   return schemas;
@@ -112,6 +137,7 @@ void Db3Messages::read_topics() {
                          .encoding = escaped(text_at(found.get(), 3)),
                          .schema = {.name = escaped(type), .encoding = {}, .definition = {}}};
     const auto schema = schemas.find(type);
+    budget().keep(schema != schemas.end() ? schema->second.definition.size() : 0);
     if (schema != schemas.end() && !schema->second.definition.empty())
       topic.schema = schema->second;
     else if (const std::string_view common = common_definition(type); !common.empty())
@@ -122,6 +148,7 @@ void Db3Messages::read_topics() {
 
 bool Db3Messages::next(LogMessage& message) {
   if (!step(messages_)) return false;
+  budget().work(1);
   const auto topic = topics_.find(sqlite3_column_int64(messages_.get(), 0));
   if (topic == topics_.end()) refuse("a message of a topic that is not in its list");
   const void* const data = sqlite3_column_blob(messages_.get(), 2);

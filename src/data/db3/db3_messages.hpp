@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <map>
 #include <memory>
 #include <string>
@@ -43,12 +44,14 @@ class Db3Messages final : public MessageSource {
   /// The next row. @returns false after the last
   bool step(const Statement& statement);
   [[nodiscard]] bool has_table(const char* name);
+  void require_plain(const char* table);
+  [[nodiscard]] static int watch(void* self) noexcept;
   [[nodiscard]] std::map<std::string, MessageSchema, std::less<>> definitions();
   void read_topics();
   [[noreturn]] void refuse(const std::string& problem) const;
 
   std::string path_;
-  Progress progress_;
+  std::exception_ptr stopped_;  ///< why the database was asked to stop
   std::unique_ptr<sqlite3, CloseDatabase> database_;
   std::map<std::int64_t, MessageChannel> topics_;
   Statement messages_;

@@ -23,8 +23,12 @@ std::uint32_t mcap_checksum(std::string_view bytes, std::uint32_t before) noexce
       crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-McapRecords::McapRecords(ByteSource& source, std::string name, McapLimits limits)
-    : source_(source), name_(std::move(name)), limits_(limits) {
+McapRecords::McapRecords(ByteSource& source, const std::string& name, McapLimits limits,
+                         Progress progress)
+    : MessageSource(ReadBudget(name, std::move(progress))),
+      source_(source),
+      name_(name),
+      limits_(limits) {
   std::string mark;
   if (!read(mark, kMcapMark.size()) || mark != kMcapMark)
     refuse("the first bytes are not its mark");
@@ -39,6 +43,7 @@ void McapRecords::refuse(const std::string& problem) const {
 
 bool McapRecords::read(std::string& to, std::size_t size) {
   const bool is_whole = read_exactly(source_, to, size);
+  budget().read_to(source_.bytes_read());
   if (is_whole) place_ += size;
   return is_whole;
 }
@@ -55,16 +60,17 @@ bool McapRecords::next(LogMessage& message) {
     LittleEndianReader reader(head);
     const auto kind = static_cast<McapKind>(*reader.number<std::uint8_t>());
     const std::uint64_t size = *reader.number<std::uint64_t>();
+    if (static_cast<std::uint8_t>(kind) == 0) refuse("a record without a kind");
     if (size > limits_.record_bytes)
       refuse(fmt::format("a record of {} bytes; at most {} are read", size, limits_.record_bytes));
+    budget().work(1);
     if (!read(record_, size)) {
       is_unfinished_ = is_at_end_ = true;
       return false;
     }
     if (kind == McapKind::data_end || kind == McapKind::footer) {
       is_at_end_ = true;
-      while (read(record_, std::size_t{1} << 16)) {
-      }  // the hash is that of the whole file
+      if (kind == McapKind::data_end) read_to_end();
       return false;
     }
     if (kind == McapKind::chunk) {
@@ -72,6 +78,20 @@ bool McapRecords::next(LogMessage& message) {
     } else if (take(kind, record_, message)) {
       return true;
     }
+  }
+}
+
+// What follows the data is an index, the footer and the mark. The rest of a damaged file is not read.
+void McapRecords::read_to_end() {
+  std::string head;
+  while (read(head, kRecordHead)) {
+    LittleEndianReader reader(head);
+    const auto kind = static_cast<McapKind>(*reader.number<std::uint8_t>());
+    const std::uint64_t size = *reader.number<std::uint64_t>();
+    budget().work(1);
+    if (static_cast<std::uint8_t>(kind) == 0 || size > limits_.record_bytes || !read(record_, size))
+      return;
+    if (kind == McapKind::footer) return;
   }
 }
 
@@ -83,6 +103,7 @@ bool McapRecords::next_in_chunk(LogMessage& message) {
     if (!kind || !size || *size > reader.left()) refuse("a chunk ends inside a record");
     const auto content = *reader.bytes(static_cast<std::size_t>(*size));
     chunk_at_ += reader.at();
+    budget().work(1);
     if (take(static_cast<McapKind>(*kind), content, message)) return true;
   }
   return false;
@@ -108,6 +129,7 @@ bool McapRecords::take(McapKind kind, std::string_view content, LogMessage& mess
     const auto encoding = reader.text<std::uint32_t>();
     const auto definition = reader.text<std::uint32_t>();
     if (!id || !name || !encoding || !definition) refuse("a schema is too short");
+    budget().keep(definition->size());
     schemas_[*id] = {escaped(*name), escaped(*encoding), std::string(*definition)};
   }
   if (kind == McapKind::channel) {
@@ -121,6 +143,7 @@ bool McapRecords::take(McapKind kind, std::string_view content, LogMessage& mess
       refuse(fmt::format("channel '{}' has a schema that is not declared", printable(*topic)));
     if (channels_.size() >= limits_.channels)
       refuse(fmt::format("more than {} channels", limits_.channels));
+    if (*schema != 0) budget().keep(found->second.definition.size());
     channels_.try_emplace(*id,
                           MessageChannel{.topic = escaped(*topic),
                                          .encoding = escaped(*encoding),
@@ -140,6 +163,7 @@ void McapRecords::open_chunk(std::string_view content) {
   if (!first || !last || !size || !expected || !packing || !packed) refuse("a chunk is too short");
   if (*size > limits_.record_bytes)
     refuse(fmt::format("a chunk of {} bytes; at most {} are read", *size, limits_.record_bytes));
+  budget().require(*size);
   chunk_at_ = 0;
   if (!unpack_chunk(*packing, *packed, static_cast<std::size_t>(*size), chunk_))
     refuse(fmt::format("a chunk packed by '{}' cannot be unpacked; known are {}",

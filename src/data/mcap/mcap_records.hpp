@@ -45,7 +45,8 @@ struct McapLimits {
 /// Chunks are plain, lz4 or zstd; their checksums are verified. Source: MCAP format specification.
 class McapRecords final : public MessageSource {
  public:
-  McapRecords(ByteSource& source, std::string name, McapLimits limits = {});
+  McapRecords(ByteSource& source, const std::string& name, McapLimits limits = {},
+              Progress progress = {});
 
   bool next(LogMessage& message) override;
 
@@ -55,6 +56,7 @@ class McapRecords final : public MessageSource {
  private:
   /// Reads `size` bytes into `to`. @returns false if the file ends before.
   bool read(std::string& to, std::size_t size);
+  void read_to_end();
   bool next_in_chunk(LogMessage& message);
   bool take(McapKind kind, std::string_view content, LogMessage& message);
   void open_chunk(std::string_view content);

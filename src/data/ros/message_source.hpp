@@ -3,6 +3,9 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include "data/read_budget.hpp"
 
 namespace torsio {
 
@@ -27,11 +30,17 @@ struct LogMessage {
 /// The messages of a file in its order, whatever its format.
 class MessageSource {
  public:
+  explicit MessageSource(ReadBudget budget) : budget_(std::move(budget)) {}
   virtual ~MessageSource() = default;
   /// @returns false at the end. @throws Error with the place where the file contradicts its format.
   virtual bool next(LogMessage& message) = 0;
   /// The file ended without the record that closes it; known at the end.
   [[nodiscard]] virtual bool is_unfinished() const noexcept { return false; }
+  /// For all that is made of the messages, too.
+  [[nodiscard]] ReadBudget& budget() noexcept { return budget_; }
+
+ private:
+  ReadBudget budget_;
 };
 
 }  // namespace torsio

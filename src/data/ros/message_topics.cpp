@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "data/names.hpp"
+#include "data/ros/json_nesting.hpp"
 #include "data/ros/ros_decoder.hpp"
 #include "data/ros/ros_schema.hpp"
 #include "torsio/core/error.hpp"
@@ -24,14 +25,19 @@ bool is_of(std::string_view column, std::string_view topic) {
   return column.size() > topic.size() && column.starts_with(topic) && column[topic.size()] == '/';
 }
 
+/// A document takes up to so many times the memory of its text.
+constexpr std::size_t kJsonBytes = 20;
+
 /// The numbers of a JSON message, "/topic/field/sub".
-void set_numbers(const nlohmann::json& value, const std::string& name, TopicTable& table) {
+void set_numbers(const nlohmann::json& value, const std::string& name, TopicTable& table,
+                 ReadBudget& budget) {
+  budget.work(1);
   if (value.is_number() || value.is_boolean()) {
-    table.set(table.column(name),
+    table.set(table.column(name, budget),
               value.is_boolean() ? (value.get<bool>() ? 1.0 : 0.0) : value.get<double>());
   } else if (value.is_structured()) {
     for (const auto& [key, part] : value.items())
-      set_numbers(part, name + "/" + escaped(key), table);
+      set_numbers(part, name + "/" + escaped(key), table, budget);
   }
 }
 
@@ -72,6 +78,7 @@ class Topics {
   /// The messages of one more file.
   void add(const NamedMessages& file) {
     name_ = file.name;
+    budget_ = &file.messages->budget();
     messages_ = 0;
     LogMessage message;
     while (file.messages->next(message)) add(message);
@@ -90,7 +97,7 @@ class Topics {
     if (topic.problem.empty())
       decode(topic, channel, message);
     else
-      topic.table.end_row(message.log_time_ns, messages_);
+      topic.table.end_row(message.log_time_ns, messages_, *budget_);
   }
 
   [[nodiscard]] std::string place() const {
@@ -108,10 +115,13 @@ class Topics {
     if (!is_wanted(channel.topic) && channel.schema.name != kOwnSchema) {
       topic.problem = "not wanted";
     } else if (const auto encoding = encoding_of(channel)) {
-      topic.decoder.emplace(channel.topic,
-                            parse_ros_schema(channel.schema.name, channel.schema.definition,
-                                             fmt::format("{}: {}", name_, channel.topic)),
-                            *encoding);
+      RosSchema schema = parse_ros_schema(channel.schema.name, channel.schema.definition,
+                                          fmt::format("{}: {}", name_, channel.topic));
+      std::size_t fields = schema.types.size();
+      for (const RosType& type : schema.types) fields += type.fields.size();
+      budget_->keep(2 * sizeof(RosField) * fields);
+      budget_->work(fields);
+      topic.decoder.emplace(channel.topic, std::move(schema), *encoding);
       if (channel.schema.name == kOwnSchema) topic.own_names = own_names(channel);
     } else if (channel.encoding != "json") {
       topic.problem = fmt::format("messages in {}, described in {}, are not supported",
@@ -127,14 +137,16 @@ class Topics {
   void decode(Topic& topic, const MessageChannel& channel, const LogMessage& message) {
     std::optional<std::int64_t> stamp_ns;
     if (topic.decoder) {
-      if (!topic.decoder->decode(message.data, topic.table)) refuse(channel, message);
+      if (!topic.decoder->decode(message.data, topic.table, *budget_)) refuse(channel, message);
       stamp_ns = topic.decoder->stamp_ns();
     } else {
+      if (is_nested_too_deeply(message.data)) refuse(channel, message);
+      budget_->require(kJsonBytes * message.data.size());
       const auto json = nlohmann::json::parse(message.data, nullptr, false);
       if (json.is_discarded()) refuse(channel, message);
-      set_numbers(json, channel.topic, topic.table);
+      set_numbers(json, channel.topic, topic.table, *budget_);
     }
-    topic.table.end_row(stamp_ns.value_or(message.log_time_ns), messages_);
+    topic.table.end_row(stamp_ns.value_or(message.log_time_ns), messages_, *budget_);
     values_ += topic.table.columns().size();
     if (values_ > options_.values)
       throw Error({.place = place(),
@@ -157,6 +169,7 @@ class Topics {
 
   std::string name_;
   const TopicOptions& options_;
+  ReadBudget* budget_ = nullptr;
   std::map<std::string, Topic> topics_;
   std::size_t messages_ = 0;
   std::size_t values_ = 0;
@@ -246,7 +259,8 @@ void add_other(LogTable& table, const TopicTable& other, const std::vector<std::
   }
 }
 
-LogTable joined_topics(Topics& topics, const TopicOptions& options, const std::string& name) {
+LogTable joined_topics(Topics& topics, const TopicOptions& options, const std::string& name,
+                       ReadBudget& budget) {
   TopicTable* base = nullptr;
   bool is_own = false;
   std::vector<TopicTable*> used;
@@ -289,7 +303,10 @@ LogTable joined_topics(Topics& topics, const TopicOptions& options, const std::s
                  .advice = "torsio check --list FILE prints their times; use those of one topic."});
   if (!is_own) add_clock(table, *base, first);
   add_base(table, *base, first);
-  for (const auto& [other, rows] : others) add_other(table, *other, rows, first);
+  for (const auto& [other, rows] : others) {
+    budget.keep((sizeof(double) + 1) * rows.size() * other->columns().size());
+    add_other(table, *other, rows, first);
+  }
   return table;
 }
 
@@ -306,7 +323,9 @@ LogTable table_of_messages(std::span<const NamedMessages> files, const std::stri
                            const TopicOptions& options) {
   Topics topics(options);
   for (const NamedMessages& file : files) topics.add(file);
-  return joined_topics(topics, options, name);
+  LogTable table = joined_topics(topics, options, name, files.back().messages->budget());
+  table.is_unfinished = topics.is_unfinished();
+  return table;
 }
 
 LogSummary summary_of_messages(std::span<const NamedMessages> files, const TopicOptions& options) {

@@ -24,11 +24,12 @@ RosDecoder::RosDecoder(std::string topic, RosSchema schema, RosEncoding encoding
       encoding_(encoding),
       root_{.name = topic_} {}
 
-bool RosDecoder::decode(std::string_view message, TopicTable& table) {
+bool RosDecoder::decode(std::string_view message, TopicTable& table, ReadBudget& budget) {
   constexpr std::size_t kEncapsulation = 4;
   constexpr char kLittleEndianCdr = 1;
   stamp_ns_.reset();
   table_ = &table;
+  budget_ = &budget;
   const bool has_head = encoding_ == RosEncoding::cdr;
   const bool is_known = !has_head || (message.size() >= kEncapsulation && message[0] == 0 &&
                                       message[1] == kLittleEndianCdr);
@@ -41,8 +42,7 @@ bool RosDecoder::decode(std::string_view message, TopicTable& table) {
 bool RosDecoder::decode_type(std::size_t type, Place& place) {
   const std::vector<RosField>& fields = schema_.types[type].fields;
   if (place.parts.empty())
-    for (const RosField& field : fields)
-      place.parts.push_back({.name = place.name + "/" + field.name});
+    for (const RosField& field : fields) add_part(place, place.name + "/" + field.name);
   for (std::size_t i = 0; i < fields.size(); ++i)
     if (!decode_field(fields[i], place.parts[i])) return false;
   return true;
@@ -79,16 +79,21 @@ RosDecoder::Place& RosDecoder::element(Place& place, const RosField& field,
   }
   while (place.parts.size() <= index) {
     const std::size_t next = place.parts.size();
-    place.parts.push_back({.name = next < names_.size()
-                                       ? topic_ + "/" + names_[next] + "/" + field.name
-                                       : place.name + "/" + std::to_string(next)});
+    add_part(place, next < names_.size() ? topic_ + "/" + names_[next] + "/" + field.name
+                                         : place.name + "/" + std::to_string(next));
   }
   return place.parts[index];
+}
+
+void RosDecoder::add_part(Place& place, std::string name) const {
+  budget_->keep(2 * sizeof(Place) + name.size());
+  place.parts.push_back({.name = std::move(name)});
 }
 
 bool RosDecoder::decode_names(std::size_t count) {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < count; ++i) {
+    budget_->work(1);
     if (!align(sizeof(std::uint32_t))) return false;
     const auto text = reader_.text<std::uint32_t>();
     if (!text) return false;
@@ -102,12 +107,13 @@ bool RosDecoder::decode_names(std::size_t count) {
 }
 
 bool RosDecoder::decode_one(const RosField& field, Place& place) {
+  budget_->work(1);
   if (field.kind == RosKind::text) return skip(field, 1);
   if (field.kind == RosKind::nested)
     return is_time(field) ? decode_time(place) : decode_type(field.type, place);
   const auto value = number(field.kind);
   if (!value) return false;
-  if (!place.column) place.column = table_->column(place.name);
+  if (!place.column) place.column = table_->column(place.name, *budget_);
   table_->set(*place.column, *value);
   return true;
 }
@@ -123,7 +129,7 @@ bool RosDecoder::decode_time(Place& place) {
   const auto nanoseconds = reader_.number<std::uint32_t>();
   if (!seconds || !nanoseconds) return false;
   const std::int64_t stamp_ns = kNanoseconds * *seconds + *nanoseconds;
-  if (!place.column) place.column = table_->column(place.name);
+  if (!place.column) place.column = table_->column(place.name, *budget_);
   table_->set(*place.column, 1e-9 * static_cast<double>(stamp_ns));
   if (stamp_ns != 0 && place.name == topic_ + "/header/stamp") stamp_ns_ = stamp_ns;
   return true;
@@ -135,6 +141,7 @@ bool RosDecoder::skip(const RosField& field, std::size_t count) {
     return align(bytes) && count <= reader_.left() / bytes &&
            reader_.bytes(count * bytes).has_value();
   for (std::size_t i = 0; i < count; ++i) {
+    budget_->work(1);
     if (field.kind == RosKind::text) {
       if (!align(sizeof(std::uint32_t)) || !reader_.text<std::uint32_t>()) return false;
       continue;

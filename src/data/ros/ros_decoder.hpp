@@ -32,7 +32,8 @@ class RosDecoder {
   /// Sets the fields of a message in the row of `table`.
   /// @returns false if the message ends too early, or is not in that encoding, little-endian; the row
   /// is then dropped
-  bool decode(std::string_view message, TopicTable& table);
+  /// @throws Error beyond the budget of the file.
+  bool decode(std::string_view message, TopicTable& table, ReadBudget& budget);
 
   /// The `header.stamp` in the last message, unless that is zero or absent.
   [[nodiscard]] std::optional<std::int64_t> stamp_ns() const noexcept { return stamp_ns_; }
@@ -61,6 +62,7 @@ class RosDecoder {
   [[nodiscard]] bool is_time(const RosField& field) const;
   [[nodiscard]] std::optional<double> number(RosKind kind);
   [[nodiscard]] Place& element(Place& place, const RosField& field, std::size_t index) const;
+  void add_part(Place& place, std::string name) const;
 
   std::string topic_;
   RosSchema schema_;
@@ -68,6 +70,7 @@ class RosDecoder {
   Place root_;
   LittleEndianReader reader_{{}};
   TopicTable* table_ = nullptr;
+  ReadBudget* budget_ = nullptr;
   std::vector<std::string> names_;
   std::size_t names_version_ = 0;  ///< counts the changes of `names_`
   std::optional<std::int64_t> stamp_ns_;

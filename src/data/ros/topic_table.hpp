@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "data/read_budget.hpp"
 #include "torsio/core/estimate.hpp"
 
 namespace torsio {
@@ -21,10 +22,12 @@ class TopicTable {
   };
 
   /// The column of that name; made, with NaN in the rows so far, if it is new.
-  std::size_t column(const std::string& name) {
-    const auto [at, is_new] = by_name_.try_emplace(name, columns_.size());
-    if (is_new) columns_.push_back({name, {}});
-    return at->second;
+  std::size_t column(const std::string& name, ReadBudget& budget) {
+    if (const auto at = by_name_.find(name); at != by_name_.end()) return at->second;
+    budget.keep(kColumnBytes + 2 * name.size() + sizeof(double) * rows());
+    by_name_.emplace(name, columns_.size());
+    columns_.push_back({name, {}});
+    return columns_.size() - 1;
   }
   /// The value in the row that is being made; the last one counts.
   void set(std::size_t column, double value) {
@@ -33,7 +36,8 @@ class TopicTable {
     if (values.size() == stamps_ns_.size()) values.push_back(value);
   }
   /// Ends the row. `number`: place of the message among those of the file, from 1.
-  void end_row(std::int64_t stamp_ns, std::size_t number) {
+  void end_row(std::int64_t stamp_ns, std::size_t number, ReadBudget& budget) {
+    budget.keep(sizeof(double) * (columns_.size() + 2));
     stamps_ns_.push_back(stamp_ns);
     numbers_.push_back(number);
   }
@@ -54,6 +58,8 @@ class TopicTable {
   [[nodiscard]] const std::vector<std::size_t>& numbers() const noexcept { return numbers_; }
 
  private:
+  static constexpr std::size_t kColumnBytes = 200;  ///< besides name and values
+
   std::vector<Column> columns_;
   std::unordered_map<std::string, std::size_t> by_name_;
   std::vector<std::int64_t> stamps_ns_;
