@@ -148,6 +148,28 @@ double Redundancy::minimise(SourceSet valid, const Row& precision, Row& u) const
   return variance;
 }
 
+// var(t_i - tau) = S_ii - 2 (S w)_i + w' S w. Divided by the smallest error bar squared, so that no square
+// overflows.
+double Redundancy::disagreement_Nm(std::span<const Estimate> sources, const FusedTorque& fused,
+                                   const Row& std_dev_Nm, double smallest_Nm,
+                                   const Row& u) const noexcept {
+  const double combined = fused.std_dev_Nm / smallest_Nm;
+  double largest_Nm = 0.0;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if ((fused.used >> i & 1U) == 0) continue;
+    double common = 0.0;
+    for (std::size_t j = 0; j < sources.size(); ++j) common += correlation_[i][j] * u[j];
+    const double own = std_dev_Nm[i] / smallest_Nm;
+    const double expected_Nm =
+        smallest_Nm * std::sqrt(std::max(0.0, own * (own - 2.0 * common) + combined * combined));
+    const double found_Nm = std::abs(sources[i].value - fused.value_Nm);
+    if (found_Nm > expected_Nm)
+      largest_Nm = std::max(largest_Nm,
+                            std::sqrt(found_Nm - expected_Nm) * std::sqrt(found_Nm + expected_Nm));
+  }
+  return largest_Nm;
+}
+
 FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
   FusedTorque fused{.value_Nm = last_Nm_, .fault = Fault::input_not_finite};
   if (sources.size() != settings_.sources.size()) {
@@ -183,6 +205,8 @@ FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
   // Between the estimates in spite of rounding; in this order a number in every case.
   last_Nm_ = fused.value_Nm = std::min(std::max(lowest_Nm, value_Nm), highest_Nm);
   fused.std_dev_Nm = smallest_Nm * std::sqrt(variance);
+  fused.std_dev_Nm =
+      std::hypot(fused.std_dev_Nm, disagreement_Nm(sources, fused, std_dev_Nm, smallest_Nm, u));
   fused.not_redundant = shared;
   fused.fault = Fault::none;
   return fused;

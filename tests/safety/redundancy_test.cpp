@@ -130,11 +130,17 @@ Case random_case(Random& random) {
   return result;
 }
 
+/// Sources that differ have a longer error bar.
+std::vector<Estimate> agreeing(std::vector<Estimate> sources) {
+  for (Estimate& source : sources) source.value = sources.front().value;
+  return sources;
+}
+
 TEST(Redundancy, WeighsUncorrelatedSourcesByTheSquaresOfTheirErrorBars) {
   Redundancy redundancy(three_sources());
   const FusedTorque fused =
-      redundancy.step(std::array{torque(1.0, 1.0), torque(2.0, 0.5), torque(4.0, 2.0)});
-  EXPECT_NEAR(fused.value_Nm, (1.0 * 1.0 + 4.0 * 2.0 + 0.25 * 4.0) / 5.25, 1e-12);
+      redundancy.step(std::array{torque(1.8, 1.0), torque(2.0, 0.5), torque(3.0, 2.0)});
+  EXPECT_NEAR(fused.value_Nm, (1.0 * 1.8 + 4.0 * 2.0 + 0.25 * 3.0) / 5.25, 1e-12);
   EXPECT_NEAR(fused.std_dev_Nm, 1.0 / std::sqrt(5.25), 1e-12);
   EXPECT_EQ(fused.used, 0b111U);
   EXPECT_EQ(fused.fault, Fault::none);
@@ -144,8 +150,8 @@ TEST(Redundancy, TakesTheCorrelationOfTheErrorsIntoAccount) {
   RedundancySettings settings = anonymous_sources(2);
   settings.correlation = {1.0, 0.5, 0.5, 1.0};
   Redundancy redundancy(settings);
-  const FusedTorque equal = redundancy.step(std::array{torque(1.0, 2.0), torque(3.0, 2.0)});
-  EXPECT_NEAR(equal.value_Nm, 2.0, 1e-12);
+  const FusedTorque equal = redundancy.step(std::array{torque(1.0, 2.0), torque(2.0, 2.0)});
+  EXPECT_NEAR(equal.value_Nm, 1.5, 1e-12);
   EXPECT_NEAR(equal.std_dev_Nm, 2.0 * std::sqrt(0.75), 1e-12);
   const FusedTorque unequal = redundancy.step(std::array{torque(1.0, 1.0), torque(3.0, 1.5)});
   // w2 = (s1^2 - R s1 s2) / (s1^2 + s2^2 - 2 R s1 s2)
@@ -186,7 +192,7 @@ TEST(Redundancy, LeavesOutExactlyTheSourcesThatReportThemselvesInvalid) {
       {.value = 9.0, .std_dev = -0.1}};
   for (const Estimate& bad : invalid) {
     Redundancy redundancy(three_sources());
-    const FusedTorque fused = redundancy.step(std::array{torque(1.0, 1.0), bad, torque(3.0, 1.0)});
+    const FusedTorque fused = redundancy.step(std::array{torque(1.9, 1.0), bad, torque(2.1, 1.0)});
     EXPECT_EQ(fused.used, 0b101U);
     EXPECT_NEAR(fused.value_Nm, 2.0, 1e-12);
     EXPECT_NEAR(fused.std_dev_Nm, std::sqrt(0.5), 1e-12);
@@ -215,6 +221,24 @@ TEST(Redundancy, UsesValidSourcesHoweverMuchTheyDisagree) {
   EXPECT_EQ(fused.used, 0b111U) << "no vote";
   EXPECT_NEAR(fused.value_Nm, (2.0 + 1e6) / 3.0, 1e-6);
   EXPECT_EQ(fused.fault, Fault::none);
+}
+
+// One of the two is wrong by more than it reports, and the torque follows the one with the larger weight.
+TEST(Redundancy, TheErrorBarContainsWhatTheErrorBarsOfTheSourcesDoNotExplain) {
+  Redundancy redundancy(three_sources());
+  const double agreeing_Nm =
+      redundancy.step(std::array{torque(5.0, 1.2), torque(5.0, 0.3), torque(5.0, 1.2)}).std_dev_Nm;
+  for (const double wrong_by_Nm : {0.5, 1.5, 2.0, 3.0, 6.0}) {
+    const FusedTorque fused = redundancy.step(
+        std::array{torque(5.0, 1.2), torque(5.0 + wrong_by_Nm, 0.3), torque(5.0, 1.2)});
+    EXPECT_LT(fused.value_Nm - 5.0, 5.0 * fused.std_dev_Nm) << wrong_by_Nm;
+    if (wrong_by_Nm < 1.0) {
+      EXPECT_NEAR(fused.std_dev_Nm, agreeing_Nm, 1e-12);
+    }
+    if (wrong_by_Nm > 2.5) {
+      EXPECT_LT(fused.value_Nm - 5.0, 1.5 * fused.std_dev_Nm);
+    }
+  }
 }
 
 TEST(Redundancy, HoldsTheLastTorqueWithoutAValidSource) {
@@ -254,7 +278,7 @@ TEST(Redundancy, TakesErrorBarsOfAnySize) {
   Redundancy redundancy(three_sources());
   for (const double scale : {1e-300, 1e-200, 1.0, 1e200, 1e307}) {
     const FusedTorque fused =
-        redundancy.step(std::array{torque(1.0, scale), torque(3.0, scale), torque(2.0, scale)});
+        redundancy.step(std::array{torque(2.0, scale), torque(2.0, scale), torque(2.0, scale)});
     EXPECT_NEAR(fused.value_Nm, 2.0, 1e-12) << scale;
     EXPECT_NEAR(fused.std_dev_Nm / scale, std::sqrt(1.0 / 3.0), 1e-12) << scale;
   }
@@ -417,7 +441,7 @@ RC_GTEST_PROP(Redundancy, HasTheSmallestVarianceOfAllWeightsThatAreNotNegative, 
   Random random = any_random();
   for (int n = 0; n < 20; ++n) {
     const Case drawn = random_case(random);
-    const FusedTorque fused = Redundancy(drawn.settings).step(drawn.sources);
+    const FusedTorque fused = Redundancy(drawn.settings).step(agreeing(drawn.sources));
     const double best = std::sqrt(smallest_variance(drawn.std_devs, drawn.settings.correlation));
     RC_ASSERT(std::abs(fused.std_dev_Nm / best - 1.0) < 1e-6);
   }
@@ -439,9 +463,9 @@ RC_GTEST_PROP(Redundancy, IsNeverMoreCertainWithASourceLess, ()) {
   for (int n = 0; n < 20; ++n) {
     const Case drawn = random_case(random);
     Redundancy redundancy(drawn.settings);
-    const FusedTorque all = redundancy.step(drawn.sources);
+    const FusedTorque all = redundancy.step(agreeing(drawn.sources));
     for (std::size_t lost = 0; lost < drawn.sources.size(); ++lost) {
-      std::vector<Estimate> fewer = drawn.sources;
+      std::vector<Estimate> fewer = agreeing(drawn.sources);
       fewer[lost].fault = Fault::input_not_finite;
       const FusedTorque fused = redundancy.step(fewer);
       RC_ASSERT(fused.used == (all.used & ~(SourceSet{1} << lost)));

@@ -49,12 +49,14 @@ struct FusedTorque {
 
 /// Combines estimates of one torque by their error bars:
 ///
-///     tau = w' t,  var = w' S w,  S_ij = c_i s_i R_ij c_j s_j
+///     tau = w' t,  var = w' S w + d,  S_ij = c_i s_i R_ij c_j s_j
+///     d = max_i max(0, (t_i - tau)^2 - (S_ii - 2 (S w)_i + w' S w))
 ///
 /// t the valid estimates, s their error bars at this tick, c the factors of the settings, R the correlation of their errors. w are
-/// the weights >= 0 with sum 1 of the smallest variance. Since the weights are not negative, the
-/// result lies between the estimates; since a smaller set of sources has a larger minimum, the
-/// error bar never becomes narrower when a source is lost.
+/// the weights >= 0 with sum 1 for which w' S w is smallest, and d the disagreement that the error bars do not
+/// explain: one of the sources is wrong by more than it reports, and it may be the one with the largest
+/// weight. Since the weights are not negative, the result lies between the estimates; since a smaller set of
+/// sources has a larger minimum, the error bar does not become narrower when a source is lost that agrees.
 ///
 /// A source is left out only if it reports itself invalid: a fault, a value that is not finite, an
 /// error bar that is not finite or not positive. Valid sources that disagree are all used: which of
@@ -96,6 +98,10 @@ class Redundancy {
   /// @param precision smallest error bar divided by that of each source; 0 if it is not valid
   /// @param u output: weights divided by `precision`
   double minimise(SourceSet valid, const Row& precision, Row& u) const noexcept;
+  /// sqrt(d)
+  [[nodiscard]] double disagreement_Nm(std::span<const Estimate> sources, const FusedTorque& fused,
+                                       const Row& std_dev_Nm, double smallest_Nm,
+                                       const Row& u) const noexcept;
   /// The same over the chosen sources; those whose weight would become negative leave the set.
   double minimise_over(SourceSet& chosen, const Row& precision, Row& u) const noexcept;
   /// The source of `others` with which the variance would decrease most, as a set; empty: none.
