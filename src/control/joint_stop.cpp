@@ -73,7 +73,10 @@ void JointStop::trigger(StopCategory category) noexcept {
   category_ = category;
   if (!is_stopping) is_triggered_ = true;
   if (category == StopCategory::power_off) {
-    if (!is_stopping) begin(Phase::ramping);  // resets the clocks; off in this very tick
+    if (!is_stopping) {
+      begin(Phase::ramping);           // resets the clocks; off in this very tick
+      last_angle_rad_ = kNotMeasured;  // the work of the current before the trigger is not counted
+    }
     is_triggered_ = false;
     begin(Phase::off);
   } else if (phase_ == Phase::holding) {
@@ -189,11 +192,24 @@ JointReference JointStop::reference(const JointReference& wanted,
   return {.mode = JointMode::velocity};
 }
 
-double JointStop::limited(double current_A, double speed_rad_s) const noexcept {
-  const double power_W = settings_.drive.torque_per_current() * current_A * speed_rad_s;
-  if (!(power_W > 0.0)) return current_A;
+// A torque s tau moves the rotor by w t + (s tau - tau_spring) t^2 / (2 J) while the current acts, so that also a
+// current against the motion does positive work where it reverses it. The share s is the largest one with
+//
+//     s tau (w t + (s tau - tau_spring) t^2 / (2 J)) <= -W
+double JointStop::limited(double current_A, const JointState& measured) const noexcept {
+  const double torque_Nm = settings_.drive.torque_per_current() * current_A;
+  const double time_s = kTicksOfACurrent * period_s_;
+  const double travel_per_Nm = 0.5 * time_s * time_s / settings_.drive.inertia();
+  const double spring_Nm = std::isfinite(measured.torque_Nm) ? measured.torque_Nm : 0.0;
+  const double square_J = torque_Nm * torque_Nm * travel_per_Nm;
+  const double line_J = torque_Nm * (measured.speed_rad_s * time_s - spring_Nm * travel_per_Nm);
   const double budget_J = std::max(-work_J_, 0.0);
-  return current_A * std::min(1.0, budget_J / (kTicksOfACurrent * period_s_ * power_W));
+  if (!(square_J + line_J > budget_J)) return current_A;
+  const double root_J = std::sqrt(line_J * line_J + 4.0 * square_J * budget_J);
+  // The root of the quadratic equation, without a difference of nearly equal numbers.
+  const double share =
+      line_J > 0.0 ? 2.0 * budget_J / (line_J + root_J) : (root_J - line_J) / (2.0 * square_J);
+  return current_A * std::min(1.0, std::isfinite(share) ? share : 0.0);
 }
 
 JointStop::Output JointStop::step(double current_A, const JointState& measured,
@@ -209,7 +225,7 @@ JointStop::Output JointStop::step(double current_A, const JointState& measured,
     output.current_A = 0.0;
     output.is_powered = false;
   } else if (phase_ != Phase::running && phase_ != Phase::releasing) {
-    output.current_A = limited(output.current_A, measured.speed_rad_s);
+    output.current_A = limited(output.current_A, measured);
   }
   const bool is_taking_over = phase_ == Phase::releasing && phase_s_ <= settings_.takeover_s;
   output.is_brake_open = phase_ != Phase::off && phase_ != Phase::engaging && !is_taking_over;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <string>
 
@@ -13,6 +14,7 @@
 #include "support/numbers.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_controller.hpp"
+#include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
@@ -198,6 +200,45 @@ TEST(JointStop, StopsUnderPowerWithoutAddingEnergy) {
           EXPECT_EQ(output.is_powered, holds) << run;
           EXPECT_EQ(rig.plant().brake()->is_closed(), !holds) << run;
         }
+}
+
+// Motions, loads, categories, pushes and losses of sensors at random.
+TEST(JointStop, DoesNoWorkInRandomStops) {
+  double worst_share = 0.0;
+  std::string worst;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    Random random(seed);
+    const auto between = [&](double low, double high) {
+      return low + (high - low) * random.uniform();
+    };
+    const char* actuator = kActuators[static_cast<std::size_t>(between(0.0, 3.999))];
+    const DataSheet sheet = data_sheet(actuator);
+    Rig rig(sheet, between(0.0, 0.4), random.uniform() < 0.3);
+    JointReference motion = kMotions[static_cast<std::size_t>(between(0.0, 3.999))];
+    motion.velocity_rad_s *= between(0.2, 2.0);
+    const int moving = static_cast<int>(between(20.0, 700.0));
+    for (int n = 0; n < moving; ++n) (void)rig.tick(motion);
+    rig.stop().trigger(static_cast<StopCategory>(between(0.0, 2.999)));
+    const double moving_J = rig.moving_J();
+    int lost = 0;
+    Lost sensor = Lost::nothing;
+    for (int n = 0; n < 1500; ++n) {
+      if (random.uniform() < 0.002) rig.push(between(-0.4, 0.4) * sheet.rating.torque_Nm.value);
+      if (random.uniform() < 0.001)
+        rig.stop().trigger(static_cast<StopCategory>(between(0.0, 2.999)));
+      if (lost == 0 && random.uniform() < 0.001) {
+        lost = static_cast<int>(between(1.0, 40.0));
+        sensor = static_cast<Lost>(between(1.0, 3.999));
+      }
+      const auto output = rig.tick(motion, lost > 0 ? sensor : Lost::nothing);
+      if (lost > 0) --lost;
+      if (output.motor_work_J <= worst_share * moving_J) continue;
+      worst_share = output.motor_work_J / moving_J;
+      worst = fmt::format("{} seed {} tick {} {}: {:.3g} J of {:.3g} J", actuator, seed, n,
+                          name(output.phase), output.motor_work_J, moving_J);
+    }
+  }
+  EXPECT_LT(worst_share, 0.02) << worst;
 }
 
 // docs/simulation/faults.md 22: what is reported is what was measured.

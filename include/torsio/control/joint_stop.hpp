@@ -24,7 +24,9 @@ enum class StopCategory : std::uint8_t {
 ///
 ///     W = Σ N k_t i Δθ   over all ticks since the trigger
 ///
-/// a current that would do positive work is reduced so that W stays <= 0. As far as the current of
+/// a current that would do positive work is reduced so that W stays <= 0, as far as the rotor moves as its inertia
+/// and the measured torque of the spring predict for the two ticks in which a current acts. With friction and play
+/// W was at most 2 % of the energy in motion in 300 random stops (test `DoesNoWorkInRandomStops`). As far as the current of
 /// the motor is the commanded one, the energy of rotor, spring, link and load then stays below that at
 /// the trigger plus the work of external forces (a passivity observer and controller, Hannaford &
 /// Ryu 2002). A load that was being lifted is therefore stopped by its weight, and sinks a little
@@ -107,7 +109,7 @@ class JointStop {
   void advance(const JointState& measured) noexcept;
   void watch(const JointState& measured) noexcept;
   [[nodiscard]] bool is_under_power() const noexcept;
-  [[nodiscard]] double limited(double current_A, double speed_rad_s) const noexcept;
+  [[nodiscard]] double limited(double current_A, const JointState& measured) const noexcept;
 
   Settings settings_;
   double period_s_;
