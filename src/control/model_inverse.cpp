@@ -126,6 +126,8 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
   is_asked_ = false;
   follows_answer_ = false;
   const Core::Conditioned input = core_.condition(inputs_.from(sample));
+  if (input.fault == Fault::outside_training_range && std::isfinite(torque_Nm))
+    return {.value = on_the_line(torque_Nm, {}), .fault = input.fault};
   if (input.fault != Fault::none || !std::isfinite(torque_Nm))
     return {.value = last_rad_,
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};

@@ -140,6 +140,8 @@ struct EstimatorBatch::Rows {
   /// The state of a row that is at rest goes from the columns into its bytes, and back.
   void leave_rest(std::size_t row) noexcept TORSIO_REALTIME;
   void find_rest(std::size_t row) noexcept TORSIO_REALTIME;
+  /// The zero of an input has changed.
+  void follow_zero() noexcept;
 
   [[nodiscard]] std::span<std::byte> state(std::size_t row) noexcept {
     return std::span(states).subspan(row * state_bytes, state_bytes);
@@ -177,9 +179,10 @@ struct EstimatorBatch::Rows {
   ModelRows model_rows;
   std::vector<std::uint8_t> is_at_rest;
   std::vector<std::uint8_t> is_ordinary;
-  std::vector<double> previous_raw;  ///< rows x channels, of rows at rest
-  std::vector<double> last_value;    ///< meaningful for rows at rest only
-  std::vector<double> features;      ///< rows x inputs
+  std::vector<double> previous_raw;    ///< rows x channels, of rows at rest
+  std::vector<double> previous_first;  ///< first feature, likewise
+  std::vector<double> last_value;      ///< meaningful for rows at rest only
+  std::vector<double> features;        ///< rows x inputs
 };
 
 EstimatorBatch::Rows::Rows(const EstimatorSettings& settings, const AnyModel& model,
@@ -195,6 +198,7 @@ EstimatorBatch::Rows::Rows(const EstimatorSettings& settings, const AnyModel& mo
       is_at_rest(rows, 0),
       is_ordinary(rows, 0),
       previous_raw(rows * channels),
+      previous_first(rows),
       last_value(rows),
       features(rows * inputs) {
   worker.core.reset();
@@ -225,7 +229,8 @@ void EstimatorBatch::Rows::leave_rest(std::size_t row) noexcept {
   is_at_rest[row] = 0;
   columns.write(row, state(row));
   read(worker.core, state(row).first(core_bytes));
-  worker.core.continue_after(previous_raw.data() + row * channels, last_value[row]);
+  worker.core.continue_after(previous_raw.data() + row * channels, previous_first[row],
+                             last_value[row]);
   write(worker.core, state(row).first(core_bytes));
   use_rows(model_rows, false, [&](auto& together) {
     together.write(row, state(row).subspan(core_bytes));
@@ -242,6 +247,7 @@ void EstimatorBatch::Rows::find_rest(std::size_t row) noexcept {
   if (!is_warm) return;
   std::ranges::copy(worker.core.previous_raw(),
                     previous_raw.begin() + static_cast<std::ptrdiff_t>(row * channels));
+  previous_first[row] = worker.core.previous_first();
   last_value[row] = worker.core.last_value();
   is_at_rest[row] = 1;
   if (!has_resting) read(resting, state(row).first(core_bytes));
@@ -278,6 +284,7 @@ void EstimatorBatch::Rows::find_ordinary(std::size_t first, std::size_t rows,
     if (columns.has_overflowed(n)) ordinary[n] = 0;
     if (ordinary[n] != 0) {
       std::copy_n(raw + n * channels, channels, previous_raw.data() + (first + n) * channels);
+      previous_first[first + n] = features[(first + n) * inputs];
     } else {
       leave_rest(first + n);
       std::fill_n(features.data() + (first + n) * inputs, inputs, 0.0);
@@ -328,6 +335,15 @@ Estimate EstimatorBatch::Rows::unusable(std::size_t row, const Estimate& estimat
   return guarded;
 }
 
+void EstimatorBatch::Rows::follow_zero() noexcept {
+  for (std::size_t row = 0; row < count; ++row) {
+    leave_rest(row);
+    read(worker.core, state(row).first(core_bytes));
+    worker.core.follow_zero();
+    write(worker.core, state(row).first(core_bytes));
+  }
+}
+
 Estimate EstimatorBatch::Rows::other_step(std::size_t row, std::span<const double> raw) noexcept {
   read(worker, state(row));
   const Estimate estimate = detail::estimator_step(worker.core, worker.model, raw);
@@ -366,7 +382,7 @@ const std::vector<std::string>& EstimatorBatch::unset_zeros() const noexcept {
 }
 
 void EstimatorBatch::set_zero(std::string_view channel, double value) {
-  rows_->worker.core.set_zero(channel, value);
+  if (rows_->worker.core.set_zero(channel, value)) rows_->follow_zero();
   rows_->resting.set_zero(channel, value);
   const std::size_t index =
       static_cast<std::size_t>(std::ranges::find(raw_inputs(), channel) - raw_inputs().begin());

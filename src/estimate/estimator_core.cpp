@@ -147,6 +147,7 @@ std::uint64_t identity_of(const EstimatorSettings& settings) noexcept {
   hash.add_value(settings.zeroed_channels);
   hash.add_value(settings.ranges);
   hash.add_value(settings.disturbances);
+  hash.add_value(settings.output);
   hash.add_value(settings.fallback);
   hash.add_value(settings.residuals);
   return hash.value();
@@ -173,11 +174,18 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
                               1.0 / settings_.sample_rate_Hz, settings_.disturbances.warm_up_s);
   has_memory_ = !memory_error_.memory().is_empty();
   depends_on_rate_ = has_memory_ || pipeline_.settling_samples() > 0;
+  if (settings_.output.largest_target > 0.0)
+    largest_output_ = OutputGuards::kLargestOutput * settings_.output.largest_target;
   resets_model_ = !memory_error_.memory().is_declared || !has_memory_;
   previous_raw_.resize(raw_inputs().size(), kNotMeasured);
+  level_.resize(raw_inputs().size());
+  between_.resize(raw_inputs().size());
+  jump_.resize(raw_inputs().size());
+  offsets_.resize(raw_inputs().size());
   jump_limits_.resize(raw_inputs().size(), std::numeric_limits<double>::infinity());
   std::ranges::transform(settings_.disturbances.largest_step, jump_limits_.begin(),
                          [](double step) { return kJumpFactor * step; });
+  raw_slopes_ = slopes_at_rest();
   limited_.resize(model_input_count);
   missed_parts_.resize(model_input_count);
   for (std::size_t i = 0; i < model_input_count; ++i)
@@ -212,9 +220,11 @@ EstimatorCore::Range EstimatorCore::range_of(std::size_t feature,
   return range;
 }
 
-void EstimatorCore::set_zero(std::string_view channel, double value) {
-  pipeline_.set_zero(channel, value);
+bool EstimatorCore::set_zero(std::string_view channel, double value) {
+  const bool has_changed = pipeline_.set_zero(channel, value);
   std::erase(unset_zeros_, channel);
+  if (has_changed) follow_zero();
+  return has_changed;
 }
 
 void EstimatorCore::reset() noexcept {
@@ -224,30 +234,20 @@ void EstimatorCore::reset() noexcept {
   last_value_ = 0.0;
   needs_reset_ = false;
   has_run_ = false;
-  excluded_ticks_ = 0.0;
   in_jump_ = false;
+  level_ticks_ = 0;
+  has_returned_ = false;
+  zero_changed_ = false;
+  excursion_ticks_ = 0.0;
+  excursion_share_ = 0.0;
+  previous_first_ = kNotMeasured;
+  std::ranges::fill(level_, 0.0);
+  std::ranges::fill(jump_, 0.0);
+  std::ranges::fill(offsets_, 0.0);
+  level_error_ = 0.0;
   std::ranges::fill(previous_raw_, kNotMeasured);
   is_wrong_rate_ = false;
   memory_error_.reset();
-}
-
-void EstimatorCore::interrupt(double ticks) noexcept {
-  if (!has_run_) return;  // a model that has not run yet starts at rest
-  excluded_ticks_ += ticks;
-  // As far as the first input can have moved to and fro meanwhile. NaN: anywhere.
-  const double travel = kJumpFactor * settings_.disturbances.largest_travel * excluded_ticks_;
-  memory_error_.interrupt(ticks, travel < first_width_ ? travel / first_width_ : 1.0);
-  needs_reset_ = resets_model_;
-}
-
-bool EstimatorCore::has_jumped(std::span<const double> raw) noexcept {
-  const double ticks = static_cast<double>(missed_) + 1.0;
-  bool jumped = false;
-  for (std::size_t i = 0; i < raw.size(); ++i) {
-    jumped |= std::abs(raw[i] - previous_raw_[i]) > ticks * jump_limits_[i];
-    previous_raw_[i] = raw[i];
-  }
-  return jumped;
 }
 
 // One variable is returned everywhere: a copy of it would cost a third of the step of a linear model.
@@ -262,64 +262,50 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
     ++missed_;
     return input;
   }
-  const bool jumped = has_jumped(raw);
-  const bool is_gap = missed_ > longest_gap_;
-  if (is_gap) interrupt(static_cast<double>(missed_));
-  if (poisoned_ || is_gap || jumped) pipeline_.reset();
+  const bool is_new = is_new_level(raw);
+  if (is_new && missed_ < longest_gap_) {
+    // It may return at once: nothing has received it then.
+    ++missed_;
+    in_jump_ = true;
+    input.fault = Fault::outside_training_range;
+    return input;
+  }
+  if (poisoned_ || missed_ > longest_gap_ || level_ticks_ > 0) pipeline_.reset();
   const Features features = pipeline_.step(raw);
   // Finite inputs can still overflow a product or leave a root's domain; differences and lags hold
   // such a value for some ticks, so the next usable tick starts afresh.
   poisoned_ = !all_finite(features);
   start_std_dev_ = pipeline_.is_settled() ? 0.0 : start_std_dev_now();
   if (poisoned_) {
-    interrupt(1.0);
     ++missed_;
     input.fault = Fault::input_not_finite;
     return input;
   }
-  missed_ = 0;
   input.features = features;
   input.for_model = features;
   input.excursion = excursion(features);
   const bool is_outside = input.excursion.is_outside();
   // An unknown zero explains an excursion without a jump.
   const bool may_have_jumped = in_jump_ || (assumes_jumps_ && unset_zeros_.empty());
-  in_jump_ = jumped || is_wrong_rate_ || (is_outside && may_have_jumped);
+  in_jump_ = is_new || is_wrong_rate_ || (is_outside && may_have_jumped);
   if (in_jump_) {
     exclude(input);
-  } else if (is_outside) {
-    limit(input);
+    has_run_ = has_run_ || !has_memory_;
+    return input;
   }
-  if (input.for_model.empty()) return input;
-  excluded_ticks_ = 0.0;
-  if (!is_outside) memory_error_.follow(features);
+  if (missed_ > 0 || zero_changed_) resume(features[0]);
+  if (is_outside) {
+    limit(input);
+  } else {
+    if (excursion_ticks_ > 0.0) end_excursion();
+    memory_error_.follow(features);
+  }
+  std::ranges::copy(raw, previous_raw_.begin());
+  previous_first_ = features[0];
   input.restarted = needs_reset_;
   needs_reset_ = false;
   has_run_ = true;
   return input;
-}
-
-// A jump can be a sensor error: no memory receives it. A model without one is stepped all the same.
-void EstimatorCore::exclude(Conditioned& input) noexcept {
-  poisoned_ = true;
-  interrupt(1.0);
-  if (has_memory_) input.for_model = {};
-  input.excursion.fallback = std::numeric_limits<double>::infinity();
-}
-
-// A continuous excursion is a motion: the memory misses no more than what the first input travelled
-// beyond its border.
-void EstimatorCore::limit(Conditioned& input) noexcept {
-  for (std::size_t i = 0; i < limited_.size(); ++i)
-    limited_[i] = std::clamp(input.features[i], ranges_[i].lowest - ranges_[i].held,
-                             ranges_[i].highest + ranges_[i].held);
-  input.for_model = limited_;
-  const double missed = std::abs(input.features[0] - limited_[0]);
-  if (!has_run_) return;
-  memory_error_.interrupt(1.0, std::min(1.0, missed / first_width_), false);
-  for (std::size_t i = 0; i < limited_.size(); ++i)
-    missed_parts_[i] = std::abs(input.features[i] - limited_[i]);
-  memory_error_.miss_others(missed_parts_, widths_);
 }
 
 Estimate EstimatorCore::held(Fault fault) const noexcept {
@@ -334,6 +320,9 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
   const double std_dev = model_std_dev(raw_estimate);
   Estimate out;
   out.fault = replaced_for(excursion, raw_estimate, std_dev);
+  if (out.fault == Fault::none && !excursion.is_outside() &&
+      std::abs(raw_estimate.value) > largest_output_)
+    out.fault = Fault::diverged;
   if (out.fault == Fault::none) {
     if (excursion.verdict() == Verdict::blend) {
       out = blended(features, raw_estimate.value, std_dev, excursion.fallback);
@@ -343,6 +332,7 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
     }
     if (!memory_error_.is_zero()) out.std_dev = std::hypot(out.std_dev, memory_error_.bound());
     if (start_std_dev_ > 0.0) out.std_dev = std::hypot(out.std_dev, start_std_dev_);
+    if (level_error_ > 0.0) out.std_dev = std::hypot(out.std_dev, level_error_);
     if (excursion.share > 0.0)
       out.std_dev = widened(out.std_dev, excursion, out.value - fallback_value(features));
     if (excursion.is_outside()) out.fault = Fault::outside_training_range;
@@ -389,7 +379,7 @@ double EstimatorCore::widened(double std_dev, const Excursion& excursion,
 }
 
 double EstimatorCore::model_std_dev(const Estimate& raw_estimate) const noexcept {
-  const double own = evidence(raw_estimate.std_dev);
+  const double own = evidence(settings_.output.error_bar_factor * raw_estimate.std_dev);
   return std::isnan(own) ? residual_std_at(raw_estimate.value) : own;
 }
 

@@ -47,9 +47,22 @@ void MemoryError::reset() noexcept {
 void MemoryError::interrupt(double ticks, double share, bool others) noexcept {
   for (std::size_t k = 0; k < share_.size(); ++k) {
     const double kept = ticks == 1.0 ? decay_[k] : std::pow(decay_[k], ticks);
-    const double own = memory_.relaxations[k].input == 0 ? share : (others ? 1.0 : 0.0);
+    const bool is_first = memory_.relaxations[k].input == 0;
+    const double own = others ? 1.0 : (is_first ? share : 0.0);
     if (share_[k] < own) share_[k] = own - (own - share_[k]) * kept;
   }
+  lose_travel(share, others);
+}
+
+void MemoryError::doubt(double ticks, double share) noexcept {
+  for (std::size_t k = 0; k < share_.size(); ++k) {
+    const double own = memory_.relaxations[k].input == 0 ? share : std::min(share, 1.0);
+    if (share_[k] < own) share_[k] = own - (own - share_[k]) * std::pow(decay_[k], ticks);
+  }
+  lose_travel(std::min(share, 1.0), true);
+}
+
+void MemoryError::lose_travel(double share, bool others) noexcept {
   if (highest_ >= lowest_) {  // usable ticks since the last interruption
     travel_before_ = std::max(0.0, unknown_travel_ - (highest_ - lowest_));
     unknown_travel_ = travel_before_;

@@ -21,7 +21,8 @@ constexpr const char* kCardKey = "torsio";
 /// Error bars and what limits a recovery may be NaN: no evidence.
 bool may_be_nan(std::string_view path) {
   return path == "fallback.residual_std" || path == "residuals.std_dev" ||
-         path == "guards.disturbances.warm_up_s" || path == "guards.disturbances.largest_travel";
+         path == "guards.output.largest_target" || path == "guards.disturbances.warm_up_s" ||
+         path == "guards.disturbances.largest_travel";
 }
 
 const std::string& card_text(const Safetensors& contents, std::string_view place) {
@@ -97,6 +98,8 @@ ModelFile read_model(std::span<const std::byte> bytes, std::string_view place,
   take_leaves(contents, "guards.ranges", place, model.settings.ranges, may_be_nan);
   if (has_tensors_of(contents, "guards.disturbances"))  // files of older builds have none
     take_leaves(contents, "guards.disturbances", place, model.settings.disturbances, may_be_nan);
+  if (has_tensors_of(contents, "guards.output"))
+    take_leaves(contents, "guards.output", place, model.settings.output, may_be_nan);
   take_leaves(contents, "fallback", place, model.settings.fallback, may_be_nan);
   take_leaves(contents, "residuals", place, model.settings.residuals, may_be_nan);
   check_nothing_left(contents, place, model.parameters.family());
@@ -112,6 +115,7 @@ std::vector<std::byte> model_bytes(const ModelFile& model) {
                 [&](const auto& parameters) { put_leaves(contents, "model", parameters); });
   put_leaves(contents, "guards.ranges", model.settings.ranges);
   put_leaves(contents, "guards.disturbances", model.settings.disturbances);
+  put_leaves(contents, "guards.output", model.settings.output);
   put_leaves(contents, "fallback", model.settings.fallback);
   put_leaves(contents, "residuals", model.settings.residuals);
   return safetensors_bytes(contents);

@@ -378,7 +378,7 @@ bool FeaturePipeline::is_rate(std::size_t feature) const noexcept {
   return program_->is_rate[feature];
 }
 
-void FeaturePipeline::set_zero(std::string_view channel, double value) {
+bool FeaturePipeline::set_zero(std::string_view channel, double value) {
   const std::vector<std::string>& names = program_->raw_inputs;
   const auto found = std::find(names.begin(), names.end(), channel);
   if (found == names.end())
@@ -390,7 +390,8 @@ void FeaturePipeline::set_zero(std::string_view channel, double value) {
     throw UsageError({.place = fmt::format("set_zero of {}", channel),
                       .expected = "a finite value",
                       .found = fmt::format("{}", value)});
-  program_->zeros[static_cast<std::size_t>(found - names.begin())] = value;
+  return std::exchange(program_->zeros[static_cast<std::size_t>(found - names.begin())], value) !=
+         value;
 }
 
 std::size_t FeaturePipeline::settling_samples() const noexcept {

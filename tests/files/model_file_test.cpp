@@ -101,7 +101,8 @@ TEST(ModelFile, NamesItsTensorsAfterTheFields) {
               testing::ElementsAre(
                   "fallback.intercept", "fallback.residual_std", "fallback.slope",
                   "guards.disturbances.largest_step", "guards.disturbances.largest_travel",
-                  "guards.disturbances.warm_up_s", "guards.ranges.highest", "guards.ranges.lowest",
+                  "guards.disturbances.warm_up_s", "guards.output.error_bar_factor",
+                  "guards.output.largest_target", "guards.ranges.highest", "guards.ranges.lowest",
                   "guards.ranges.margin", "model.coefficients.feature", "model.coefficients.knots",
                   "model.coefficients.scheduled", "model.coefficients.values", "model.rate_feature",
                   "model.rate_scale", "residuals.edges", "residuals.std_dev"));

@@ -18,9 +18,9 @@
 namespace torsio {
 namespace detail {
 
-/// One tick of an estimator.
+/// One tick of an estimator, at which no gap ends.
 template <Model M>
-Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> raw) noexcept {
+Estimate estimator_tick(EstimatorCore& core, M& model, std::span<const double> raw) noexcept {
   const detail::EstimatorCore::Conditioned input = core.condition(raw);
   if (input.fault != Fault::none) return core.held(input.fault);
   if (input.for_model.empty()) return core.apply_guards(input, {});
@@ -30,6 +30,14 @@ Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> r
   if (!is_finite) model.reset();
   if (!is_finite || raw_estimate.fault == Fault::model_not_finite) core.lose_memory();
   return core.apply_guards(input, raw_estimate);
+}
+
+/// One tick of an estimator.
+template <Model M>
+Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> raw) noexcept {
+  for (std::size_t left = core.begin_interpolation(raw); left > 0; --left)
+    estimator_tick(core, model, core.between(raw, left));
+  return estimator_tick(core, model, raw);
 }
 
 }  // namespace detail
@@ -71,11 +79,13 @@ Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> r
 ///   fallback.
 ///
 /// If the fallback overflows, the last value is held. After a gap of at most `kLongestGapSeconds`
-/// (never less than one tick) filters and model continue as if the missing ticks did not exist, so
-/// a plain `rate(x)` shows the whole step over the gap in one tick; after a longer gap the filters
-/// restart and warm up, and the model recovers. A model with memory is not stepped after a jump until
-/// the features are inside their ranges, and in an excursion without a jump it is stepped with the
-/// features limited to their ranges and borders, or to where its value is used. A model without an error bar
+/// (never less than one tick) filters and model receive interpolated inputs for the missing ticks, unless
+/// they do not depend on past samples: this tick costs as many steps more. After a longer gap the
+/// filters restart and warm up, and the model recovers. A jump that returns within that time is a gap. A
+/// new level is used once it has lasted for that time and the features are inside their ranges; until then a
+/// model with memory is not stepped. A continuous excursion is a motion: the model is stepped with the
+/// features limited to their ranges and borders, or to where its value is used, and recovers from what may
+/// have been wrong in it. A model without an error bar
 /// gets one from the residual table.
 template <Model M>
 class BasicEstimator {
@@ -100,7 +110,7 @@ class BasicEstimator {
   [[nodiscard]] const M& model() const noexcept { return model_; }
 
   /// Subtracts `value` (SI) from a raw channel from now on, `reset()` or not. Call it while
-  /// configuring.
+  /// configuring: another zero in mid-run is a jump, from which filters and model recover.
   /// @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value) { core_.set_zero(channel, value); }
   /// The channels in `settings().zeroed_channels` for which `set_zero` was not called yet; while
@@ -122,6 +132,9 @@ class BasicEstimator {
   /// From now on the ticks do not come at the sample rate (or do again): `Fault::wrong_rate`, unless
   /// neither the features nor the model depend on past samples.
   void set_wrong_rate(bool is_wrong) noexcept TORSIO_REALTIME { core_.set_wrong_rate(is_wrong); }
+
+  /// So many ticks did not take place: the loop was late or stopped. For the next `step` they are a gap.
+  void miss(double ticks) noexcept TORSIO_REALTIME { core_.miss(ticks); }
 
   /// @param raw one value for each of `raw_inputs()`; NaN for one that was not measured.
   Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME {

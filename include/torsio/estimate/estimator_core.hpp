@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -25,12 +26,13 @@ namespace torsio::detail {
 /// first input is assumed to have remained within its range of width W meanwhile, and to have moved
 /// away from its values before and after by no more than the share s of W.
 ///
-///     relaxation: e = g u,  u <- s - (s - u) exp(-t / T) during t without inputs, u <- u exp(-t / T) with
+///     relaxation: e = g u,  u <- 1 - (1 - u) exp(-t / T) during t without inputs, u <- u exp(-t / T) with
 ///     slip:       e = g max(0, min(travel, W, U) - c),  U = s W, c the range covered since then
 ///
-/// How far other inputs moved meanwhile is not known: s = 1 for relaxations over them, U = W = travel for
-/// slips over them or their integrals, c the range that these have covered since. Where they were only
-/// limited, s and U are what was cut off.
+/// A relaxation follows an input that does not move, too, so that its error does not depend on s. How far
+/// other inputs moved meanwhile is not known: U = W = travel for slips over them or their integrals, c the
+/// range that these have covered since. Where inputs were only limited or may have been wrong, the
+/// share of their range by which they were replaces 1 and s.
 ///
 /// A memory that is not declared has no bound until the warm-up time has passed after the reset.
 class MemoryError {
@@ -53,8 +55,11 @@ class MemoryError {
   void reset() noexcept;
   /// So many ticks passed without usable inputs. Successive calls without a usable tick between them
   /// are one interruption. @param share s of the whole interruption, 0 to 1
-  /// @param others whether the other inputs were missed, too
+  /// @param others whether the model was not stepped; false: it was, with a limited first input
   void interrupt(double ticks, double share = 1.0, bool others = true) noexcept TORSIO_REALTIME;
+  /// In so many ticks the memory received a first input that may have been wrong by this share of W, which
+  /// may be above 1. Infinity: in all ticks.
+  void doubt(double ticks, double share) noexcept TORSIO_REALTIME;
   /// At this tick the memory received other values of the inputs than the first: they were limited.
   /// @param missed |input - limited input|, one per input; the first is not looked at
   /// @param widths of the inputs' ranges
@@ -88,6 +93,8 @@ class MemoryError {
   };
 
   void advance(std::span<const double> inputs) noexcept;
+  /// The travel that is unknown grows by this share of W, in all other inputs to the largest one.
+  void lose_travel(double share, bool others) noexcept;
   void update_bound() noexcept;
 
   ModelMemory memory_;
@@ -106,8 +113,9 @@ class MemoryError {
   bool is_zero_ = true;
 };
 
-/// After a gap in the inputs that is longer than this, filters and model are reset; over a shorter
-/// one they continue as if its ticks did not exist.
+/// After a gap in the inputs that is longer than this, filters and model are reset. In a shorter one, what
+/// depends on time receives interpolated inputs. As long a new level after a jump has to last until it is
+/// used.
 inline constexpr double kLongestGapSeconds = 0.01;
 
 /// A raw input that changes in one tick by more than this multiple of its largest change in training
@@ -151,9 +159,10 @@ class EstimatorCore {
 
   /// One tick's raw channels after the pipeline.
   struct Conditioned {
-    Features features;          ///< empty where `fault` is not none
-    Fault fault = Fault::none;  ///< none, input_count_wrong or input_not_finite
-    bool restarted = false;     ///< the model is to be reset before it is stepped
+    Features features;  ///< empty where `fault` is not none
+    /// none, input_count_wrong, input_not_finite, or at the beginning of a jump outside_training_range
+    Fault fault = Fault::none;
+    bool restarted = false;  ///< the model is to be reset before it is stepped
     /// What the model is to be stepped with: the features, limited to their ranges and borders. Empty:
     /// the model is not to be stepped.
     Features for_model;
@@ -173,11 +182,28 @@ class EstimatorCore {
   /// which are taken as equally likely. 0 once they have decayed. Contained in the error bar.
   [[nodiscard]] double start_std_dev() const noexcept { return start_std_dev_; }
 
-  void set_zero(std::string_view channel, double value);
+  /// In mid-run as a jump: what the memory received had another zero. @returns whether it has changed
+  bool set_zero(std::string_view channel, double value);
+  /// The zero of an input has changed.
+  void follow_zero() noexcept;
   [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
     return unset_zeros_;
   }
   void reset() noexcept;
+
+  /// So many ticks did not take place.
+  void miss(double ticks) noexcept TORSIO_REALTIME {
+    missed_ = static_cast<std::size_t>(
+        std::min(static_cast<double>(missed_) + std::max(ticks, 0.0), kMaxMissed));
+  }
+  /// How many interpolated ticks, `between`, what depends on time has to receive before these inputs. A
+  /// jump there and back is a gap, too. 0: none were missed, or too many.
+  std::size_t begin_interpolation(std::span<const double> raw) noexcept TORSIO_REALTIME {
+    return missed_ == 0 || !can_interpolate(raw) ? 0 : std::exchange(missed_, 0);
+  }
+  /// @param left number of ticks between this one and `raw`, this one included
+  std::span<const double> between(std::span<const double> raw,
+                                  std::size_t left) noexcept TORSIO_REALTIME;
 
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
   /// The last value from good inputs, with the reason why it is held.
@@ -218,14 +244,16 @@ class EstimatorCore {
   /// the filters, the last raw inputs and the last value only.
   [[nodiscard]] bool is_at_rest() const noexcept TORSIO_REALTIME {
     return missed_ == 0 && !poisoned_ && !is_wrong_rate_ && !needs_reset_ && has_run_ &&
-           !in_jump_ && excluded_ticks_ == 0.0 && is_settled() && start_std_dev_ == 0.0 &&
-           memory_error_.is_zero();
+           !in_jump_ && excursion_ticks_ == 0.0 && level_error_ == 0.0 && is_settled() &&
+           start_std_dev_ == 0.0 && memory_error_.is_zero();
   }
   /// What such a tick changes besides the filters.
   [[nodiscard]] std::span<const double> previous_raw() const noexcept { return previous_raw_; }
+  [[nodiscard]] double previous_first() const noexcept { return previous_first_; }
   [[nodiscard]] double last_value() const noexcept { return last_value_; }
-  void continue_after(const double* raw, double value) noexcept TORSIO_REALTIME {
+  void continue_after(const double* raw, double first, double value) noexcept TORSIO_REALTIME {
     for (double& previous : previous_raw_) previous = *raw++;
+    previous_first_ = first;
     last_value_ = value;
   }
   /// The largest change of a raw input in a tick that is not a jump.
@@ -243,12 +271,17 @@ class EstimatorCore {
   /// The members that change in a step; not the zeros.
   void visit_state(StateBytes& bytes) noexcept {
     bytes.visit(pipeline_, missed_, poisoned_, last_value_, is_wrong_rate_, needs_reset_, has_run_,
-                in_jump_, excluded_ticks_, previous_raw_, start_std_dev_, memory_error_);
+                in_jump_, has_returned_, zero_changed_, excursion_ticks_, excursion_share_,
+                excursion_travel_, previous_first_, previous_raw_, level_, start_std_dev_,
+                memory_error_);
+    bytes.visit(level_ticks_, jump_, offsets_, level_error_);
   }
   /// Differs for the states of estimators with different settings.
   [[nodiscard]] std::uint64_t state_identity() const noexcept { return state_identity_; }
 
  private:
+  static constexpr double kMaxMissed = 1e9;
+
   struct Range {
     double lowest = 0.0;
     double highest = 0.0;
@@ -269,14 +302,26 @@ class EstimatorCore {
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double start_std_dev_now() const noexcept;
-  /// The first input could not be used for so many ticks, the last ones of `excluded_ticks_`.
+  /// The inputs of so many ticks could not be used.
   void interrupt(double ticks) noexcept;
-  /// Whether a raw input has changed faster than in training since the last tick, whose inputs are
-  /// replaced by these.
-  bool has_jumped(std::span<const double> raw) noexcept;
+  /// Whether a raw input differs from this one by more than it may change in so many ticks.
+  [[nodiscard]] bool differs(std::span<const double> raw, std::span<const double> from,
+                             std::size_t ticks) const noexcept;
+  [[nodiscard]] bool can_interpolate(std::span<const double> raw) const noexcept;
+  /// Whether a raw input has jumped, and its new level has not lasted yet.
+  bool is_new_level(std::span<const double> raw) noexcept;
+  /// The first usable tick after missed ones.
+  void resume(double first) noexcept;
+  /// Torque per raw input at rest, by the fallback. 0 where it is not known.
+  [[nodiscard]] std::vector<double> slopes_at_rest() const;
+  /// One of the two levels of a jump is wrong: from now on the error bar contains the torque between them.
+  void keep_offsets() noexcept;
   /// What the model receives in a tick after a jump, and in one of a continuous excursion.
   void exclude(Conditioned& input) noexcept;
   void limit(Conditioned& input) noexcept;
+  /// What it received in an excursion may have been wrong.
+  void count_excursion(double first) noexcept;
+  void end_excursion() noexcept;
 
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
@@ -294,11 +339,24 @@ class EstimatorCore {
   bool resets_model_ = false;  ///< a memory that is not declared starts again after an interruption
   bool depends_on_rate_ = false;
   bool is_wrong_rate_ = false;
-  bool needs_reset_ = false;          ///< the model is to be reset in its next step
-  bool has_run_ = false;              ///< the model has been stepped since `reset()`
-  bool in_jump_ = false;              ///< since a jump, no tick has been inside the ranges
-  double excluded_ticks_ = 0.0;       ///< in a row, whose inputs the model has not received
-  std::vector<double> previous_raw_;  ///< raw inputs of the last tick; NaN: none
+  bool needs_reset_ = false;              ///< the model is to be reset in its next step
+  bool has_run_ = false;                  ///< the model has been stepped since `reset()`
+  bool in_jump_ = false;                  ///< since a jump, no tick has been inside the ranges
+  std::size_t level_ticks_ = 0;           ///< since the last jump; 0: its level is in use
+  bool has_returned_ = false;             ///< the last jump returned to what a motion explains
+  bool zero_changed_ = false;             ///< since the last tick
+  double excursion_ticks_ = 0.0;          ///< since the features were inside their ranges
+  double excursion_share_ = 0.0;          ///< error of the first input in them, if it was wrong
+  double excursion_travel_ = 0.0;         ///< how far the first input moved in them
+  double previous_first_ = kNotMeasured;  ///< first feature of the last usable tick
+  std::vector<double> previous_raw_;      ///< raw inputs of the last usable tick; NaN: none
+  std::vector<double> level_;             ///< raw inputs of the last tick after a jump
+  std::vector<double> between_;           ///< interpolated raw inputs
+  std::vector<double> jump_;              ///< change of the raw inputs in the last jump
+  std::vector<double> offsets_;           ///< sum of the jumps whose levels came into use
+  std::vector<double> raw_slopes_;        ///< torque per raw input
+  double largest_output_ = std::numeric_limits<double>::infinity();
+  double level_error_ = 0.0;          ///< the torque of `offsets_`
   std::vector<double> jump_limits_;   ///< the largest change of a raw input in a tick
   std::vector<double> limited_;       ///< features
   std::vector<double> missed_parts_;  ///< by which the features were limited

@@ -82,6 +82,23 @@ struct DisturbanceGuards {
   }
 };
 
+/// Limits of the model's output from the training and the held-out data.
+struct OutputGuards {
+  /// Largest |target| in training: beyond `kLargestOutput` times that, a value is not used. NaN: not
+  /// determined, no limit.
+  double largest_target = std::numeric_limits<double>::quiet_NaN();
+  /// The model's own error bar, of a family that has one, is multiplied by this; at least 1.
+  double error_bar_factor = 1.0;
+
+  static constexpr double kLargestOutput = 3.0;
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("largest_target", self.largest_target);
+    visit("error_bar_factor", self.error_bar_factor);
+  }
+};
+
 /// Everything around the model: the path from raw channels to features, and the guards. Plain data,
 /// stored in the model file.
 struct EstimatorSettings {
@@ -92,6 +109,7 @@ struct EstimatorSettings {
                                              ///< `set_zero` at run time
   FeatureRanges ranges;
   DisturbanceGuards disturbances = {};
+  OutputGuards output = {};
   LinearFallback fallback;
   ResidualTable residuals;
 };

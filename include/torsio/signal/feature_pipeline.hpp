@@ -66,8 +66,8 @@ class FeaturePipeline {
   [[nodiscard]] bool is_rate(std::size_t feature) const noexcept;
 
   /// Subtracts `value` (SI) from a raw channel from now on; call while configuring.
-  /// @throws UsageError for an unknown channel.
-  void set_zero(std::string_view channel, double value);
+  /// @returns whether it was another value. @throws UsageError for an unknown channel.
+  bool set_zero(std::string_view channel, double value);
 
   /// Samples after `reset()` until every difference, lag and filter has settled (to 1 % of a step):
   /// the features of that step are the first that may be used. 0 if nothing has a memory.
