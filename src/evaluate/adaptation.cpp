@@ -23,6 +23,8 @@ namespace torsio {
 namespace {
 
 constexpr std::size_t kReportEvery = 64;
+/// Largest ratio of the held-out errors: those of recordings of one motion differ as much.
+constexpr double kLargestLoss = 1.1;
 
 /// Errors before each update.
 struct AdaptationTally {
@@ -129,6 +131,18 @@ std::vector<AdaptationScore> held_out_scores(const SplitScore& frozen, const Spl
   return scores;
 }
 
+/// Learning that makes the model worse is of no use, whatever the reason.
+void refuse_worse(const AdaptationScore& held_out) {
+  if (!(held_out.adapted.rmse > kLargestLoss * held_out.frozen.rmse)) return;
+  throw Error({.problem = "on the held-out samples the adapted model is worse than the frozen one",
+               .expected = fmt::format("an RMSE of at most {:.4g}", held_out.frozen.rmse),
+               .found = fmt::format("{:.4g}", held_out.adapted.rmse),
+               .advice =
+                   "Check the reference of both. If it is right, try a smaller step_size (rls: "
+                   "initial_covariance, em: more component_samples), or comparison_s as long as "
+                   "a cycle."});
+}
+
 void note_adaptation(ModelCard& card, const AdaptationSettings& settings,
                      const AdaptationCounts& counts, const Dataset& dataset) {
   const auto note = [&](const std::string& key, auto value) {
@@ -207,6 +221,7 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
     throw Error({.problem = "no held-out sample could be scored",
                  .advice = "Hold out more: --test recordings, or a larger --held-out share."});
   adapted.held_out = held_out_scores(before, after);
+  refuse_worse(adapted.held_out.back());
   // Errors on what was learned are too small for an error bar, and where nothing was learned those of
   // the frozen model remain.
   ResidualTable residuals = residual_table(AnyModel(adapted.file.parameters), lessons);

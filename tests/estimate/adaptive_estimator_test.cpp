@@ -59,7 +59,8 @@ double run(AdaptiveEstimator& adaptive, Estimator frozen, double wrong_by, int s
 TYPED_TEST(Adapted, LearnsAnOffsetWhateverTheFamily) {
   const auto network = example<TypeParam>().parameters();
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
-    AdaptiveEstimator adaptive(settings_without_zeros(), network, {.rule = rule});
+    AdaptiveEstimator adaptive(settings_without_zeros(), network,
+                               {.rule = rule, .confirmation_s = 0.0});
     const Estimator frozen(settings_without_zeros(), AnyModel(example<TypeParam>()));
     EXPECT_LT(run(adaptive, frozen, 3.0), 1.0);
     EXPECT_GT(adaptive.adapter().counts().updates(), 3000U);
@@ -70,7 +71,7 @@ TYPED_TEST(Adapted, LearnsAnOffsetWhateverTheFamily) {
 
 TYPED_TEST(Adapted, TheAdaptedNetworkHasTheOutputsOfTheAdaptiveOne) {
   const auto network = example<TypeParam>().parameters();
-  AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
+  AdaptiveEstimator adaptive(settings_without_zeros(), network, {.confirmation_s = 0.0});
   (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);
   adaptive.pause();
   adaptive.reset();
@@ -85,7 +86,7 @@ TYPED_TEST(Adapted, TheAdaptedNetworkHasTheOutputsOfTheAdaptiveOne) {
 
 TYPED_TEST(Adapted, ResetKeepsTheWeightsAndForgetDoesNot) {
   const AnyModel::Parameters network = example<TypeParam>().parameters();
-  AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
+  AdaptiveEstimator adaptive(settings_without_zeros(), network, {.confirmation_s = 0.0});
   (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);
   const std::string learned = weights<TypeParam>(adaptive.adapted());
   adaptive.reset();
@@ -109,7 +110,8 @@ TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkChangeNoWeights) {
 }
 
 TEST(AdaptiveEstimator, WaitsForItsZeros) {
-  AdaptiveEstimator adaptive(test::example_settings(), example<Mlp>().parameters(), {});
+  AdaptiveEstimator adaptive(test::example_settings(), example<Mlp>().parameters(),
+                             {.confirmation_s = 0.0});
   for (int n = 0; n < 1000; ++n) (void)adaptive.step(raw_at(n));
   EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::no_estimate);
   adaptive.set_zero("joint_angle_rad", 0.0);

@@ -155,12 +155,51 @@ TEST(AdaptModel, DoesNotLearnFromHeldAndMissingReferences) {
   for (const char* name : {"gear_angle_rad", "joint_angle_rad"}) slow.add(given.channel(name));
   slow.add(std::move(torque));
   dataset.records[0].recording = std::move(slow);
-  const AdaptedModel adapted = adapt_model(bench_model(), dataset, settings_for("nlms"));
+  const AdaptedModel adapted =
+      adapt_model(bench_model(), dataset, adaptation_settings("nlms", {{"confirmation_s", "0"}}));
   EXPECT_EQ(adapted.counts.of(UpdateOutcome::reference_not_finite), 1600U);
   EXPECT_NEAR(static_cast<double>(adapted.counts.of(UpdateOutcome::reference_stale)),
               18400 * 7 / 8.0, 300);
   EXPECT_NEAR(static_cast<double>(adapted.counts.updates()), 18400 / 8.0, 50);
   EXPECT_LT(adapted.held_out.back().adapted.rmse, adapted.held_out.back().frozen.rmse);
+}
+
+/// The lesson with a reference that is wrong for 8 of its 20 s.
+Dataset spoilt_specimen(
+    const std::function<double(const std::vector<double>&, std::size_t)>& wrong) {
+  Dataset dataset = other_specimen();
+  const Recording& given = dataset.records[0].recording;
+  Recording spoilt("lesson", 1000.0);
+  Channel torque = given.channel("torque_Nm");
+  const std::vector<double> right = torque.values;
+  for (std::size_t n = 8000; n < 16000; ++n) torque.values[n] = wrong(right, n);
+  for (const char* name : {"gear_angle_rad", "joint_angle_rad"}) spoilt.add(given.channel(name));
+  spoilt.add(std::move(torque));
+  dataset.records[0].recording = std::move(spoilt);
+  return dataset;
+}
+
+TEST(AdaptModel, PassesOverAPartWithAWrongReference) {
+  using Values = std::vector<double>;
+  const std::map<UpdateOutcome, std::function<double(const Values&, std::size_t)>> kinds{
+      {UpdateOutcome::reference_dead,
+       [](const Values&, std::size_t n) { return 1e-3 * std::sin(1e5 * static_cast<double>(n)); }},
+      {UpdateOutcome::reference_opposite, [](const Values& v, std::size_t n) { return -v[n]; }},
+      {UpdateOutcome::reference_scaled, [](const Values& v, std::size_t n) { return 3.0 * v[n]; }},
+      {UpdateOutcome::reference_unrelated, [](const Values&, std::size_t n) {
+         return 10.0 * std::sin(7.3e-3 * static_cast<double>(n));
+       }}};
+  for (const auto& [outcome, wrong] : kinds) {
+    const AdaptedModel adapted =
+        adapt_model(bench_model(), spoilt_specimen(wrong), settings_for("nlms"));
+    EXPECT_GT(adapted.counts.of(outcome), 100U) << name(outcome);
+    std::size_t passed_over = 0;
+    for (std::size_t i = static_cast<std::size_t>(UpdateOutcome::reference_unconfirmed);
+         i < kUpdateOutcomes; ++i)
+      passed_over += adapted.counts.outcomes[i];
+    EXPECT_GT(passed_over, 7500U) << name(outcome);
+    EXPECT_LE(adapted.held_out.back().adapted.rmse, adapted.held_out.back().frozen.rmse);
+  }
 }
 
 TEST(AdaptModel, RefusesWhatItCannotLearnFrom) {

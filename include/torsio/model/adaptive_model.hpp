@@ -49,8 +49,11 @@ class AdaptiveModel {
   void reset() noexcept { model_.reset(); }
   /// The estimate of the adapted parameters.
   Estimate step(Features features) noexcept TORSIO_REALTIME {
+    first_feature_ = features.empty() ? kNotMeasured : features.front();
     return adapter_->step(model_, features, model_.step(features));
   }
+  /// The first feature of the last step, by convention the deflection.
+  [[nodiscard]] double first_feature() const noexcept { return first_feature_; }
 
   [[nodiscard]] ModelAdapter& adapter() noexcept { return *adapter_; }
   [[nodiscard]] const ModelAdapter& adapter() const noexcept { return *adapter_; }
@@ -62,6 +65,7 @@ class AdaptiveModel {
   AnyModel model_;
   std::unique_ptr<ModelAdapter> adapter_;
   double sample_period_s_;
+  double first_feature_ = kNotMeasured;
 };
 
 }  // namespace torsio

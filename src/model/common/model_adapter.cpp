@@ -14,13 +14,24 @@ namespace {
 
 constexpr double kMaxTicks = 1e9;
 
-constexpr std::array<std::string_view, kUpdateOutcomes> kNames{
-    "updated",         "limited",
-    "paused",          "warming_up",
-    "no_estimate",     "reference_not_finite",
-    "reference_stale", "reference_saturated",
-    "error_too_large", "dead_zone",
-    "rolling_back"};
+constexpr std::array<std::string_view, kUpdateOutcomes> kNames{"updated",
+                                                               "limited",
+                                                               "paused",
+                                                               "warming_up",
+                                                               "no_estimate",
+                                                               "reference_not_finite",
+                                                               "reference_stale",
+                                                               "reference_saturated",
+                                                               "error_too_large",
+                                                               "dead_zone",
+                                                               "rolling_back",
+                                                               "reference_unconfirmed",
+                                                               "reference_dead",
+                                                               "reference_opposite",
+                                                               "reference_unrelated",
+                                                               "reference_scaled",
+                                                               "reference_delayed",
+                                                               "reference_outlier"};
 
 /// What `AdaptationSettings::visit_options` states about a field, as far as it is used here: the
 /// libraries of a robot have no `OptionInfo`.
@@ -111,9 +122,10 @@ void ModelAdapter::end_step(double frozen_value, double adapted_value) noexcept 
   has_step_ = true;
 }
 
-UpdateOutcome ModelAdapter::learn(const ReferenceSample& reference) noexcept {
+UpdateOutcome ModelAdapter::learn(const ReferenceSample& reference,
+                                  UpdateOutcome opinion) noexcept {
   if (paused_) return counted(UpdateOutcome::paused);
-  const UpdateOutcome verdict = outcome_of(reference);
+  const UpdateOutcome verdict = outcome_of(reference, opinion);
   has_step_ = false;
   if (verdict != UpdateOutcome::updated) return counted(verdict);
   return counted(update((reference.value - adapted_value_) / target_scale_));
@@ -122,20 +134,22 @@ UpdateOutcome ModelAdapter::learn(const ReferenceSample& reference) noexcept {
 UpdateOutcome ModelAdapter::pass_over(UpdateOutcome reason) noexcept {
   has_step_ = false;
   if (paused_) return counted(UpdateOutcome::paused);
-  compare(0.0, 0.0);
+  compare_nothing();
   return counted(reason);
 }
 
-UpdateOutcome ModelAdapter::outcome_of(const ReferenceSample& reference) noexcept {
+UpdateOutcome ModelAdapter::outcome_of(const ReferenceSample& reference,
+                                       UpdateOutcome opinion) noexcept {
   const double value = reference.value;
   // A slower sensor has no new information between its samples: steps with an unchanged value are
   // counted.
   const bool is_new = std::isfinite(value) && value != last_reference_;
   unchanged_ticks_ = is_new ? 0 : unchanged_ticks_ + 1;
   if (is_new) last_reference_ = value;
-  const UpdateOutcome doubt = doubt_about(reference);
+  UpdateOutcome doubt = doubt_about(reference);
+  if (doubt == UpdateOutcome::updated) doubt = opinion;
   if (doubt != UpdateOutcome::updated) {
-    compare(0.0, 0.0);
+    compare_nothing();
     return doubt;
   }
   compare(std::abs(value - adapted_value_), std::abs(value - frozen_value_));
@@ -158,9 +172,16 @@ UpdateOutcome ModelAdapter::doubt_about(const ReferenceSample& reference) const 
 
 void ModelAdapter::compare(double adapted_error, double frozen_error) noexcept {
   // Off from both, the sensor is wrong rather than either.
-  if (std::min(adapted_error, frozen_error) > settings_.largest_error)
-    adapted_error = frozen_error = 0.0;
-  if (!comparison_.step(adapted_error * adapted_error, frozen_error * frozen_error)) return;
+  if (std::min(adapted_error, frozen_error) > settings_.largest_error) return compare_nothing();
+  if (comparison_.step(adapted_error * adapted_error, frozen_error * frozen_error))
+    discard_what_was_learned();
+}
+
+void ModelAdapter::compare_nothing() noexcept {
+  if (comparison_.pass()) discard_what_was_learned();
+}
+
+void ModelAdapter::discard_what_was_learned() noexcept {
   roll_back();
   ++counts_.roll_backs;
 }

@@ -45,6 +45,9 @@ struct AdaptationSettings {
   double saturation = kNotMeasured;  ///< limit of |reference|; NaN: no limit
   double largest_change = 0.2;  ///< rho, limit of the change of the parameters; see the adapters
   double comparison_s = 10.0;
+  /// Nothing is learned until the reference has followed the frozen model for so long; 0: it is not
+  /// checked, only by `largest_error`.
+  double confirmation_s = 5.0;
 
   /// The settings that a user gives by name, with range and help. `rule` has a flag of its own, and
   /// a recording's references are never stale.
@@ -120,6 +123,12 @@ struct AdaptationSettings {
                               .maximum = 1e6,
                               .help = "back to the frozen model if it was better over so long; a "
                                       "cycle of the work or more"});
+    visit(self.confirmation_s,
+          {.name = "confirmation_s",
+           .minimum = 0.0,
+           .maximum = 1e6,
+           .help = "nothing is learned until the reference has followed the model's output for so "
+                   "long; 0: not checked"});
   }
 };
 
@@ -136,15 +145,22 @@ enum class UpdateOutcome : std::uint8_t {
   paused,       ///< by the caller
   warming_up,   ///< filters or hidden state have not settled
   no_estimate,  ///< no step since the last reference, or a guard reported a fault
-  reference_not_finite,  ///< NaN or infinite: not measured
-  reference_stale,       ///< older than `oldest_reference_s`, or frozen
-  reference_saturated,   ///< at the end of the sensor's range
-  error_too_large,       ///< beyond `largest_error`: probably a fault of the sensor
-  dead_zone,             ///< no more than noise
-  rolling_back,          ///< the frozen parameters are being restored, some in each step
+  reference_not_finite,   ///< NaN or infinite: not measured
+  reference_stale,        ///< older than `oldest_reference_s`, or frozen
+  reference_saturated,    ///< at the end of the sensor's range
+  error_too_large,        ///< beyond `largest_error`: probably a fault of the sensor
+  dead_zone,              ///< no more than noise
+  rolling_back,           ///< the frozen parameters are being restored, some in each step
+  reference_unconfirmed,  ///< not yet compared with the model over enough motion
+  reference_dead,         ///< it hardly changes while the model's output does
+  reference_opposite,     ///< it falls where the model's output rises
+  reference_unrelated,    ///< it does not follow the model's output
+  reference_scaled,       ///< it follows with another gain than a changed joint has
+  reference_delayed,      ///< it is later than a passive spring's torque can be
+  reference_outlier,      ///< it suddenly differs from what it was in relation to the model
 };
 inline constexpr std::size_t kUpdateOutcomes =
-    static_cast<std::size_t>(UpdateOutcome::rolling_back) + 1;
+    static_cast<std::size_t>(UpdateOutcome::reference_outlier) + 1;
 
 /// The enumerator's own spelling, for logs and JSON.
 [[nodiscard]] std::string_view name(UpdateOutcome outcome) noexcept;

@@ -20,21 +20,31 @@ class MovingComparison {
 
   void reset() noexcept;
 
-  /// One tick; both squares 0 where nothing was measured.
+  /// One tick.
   /// @returns true at the end of a block if the stretch is full and the first sum is the larger.
   bool step(double first_square, double second_square) noexcept TORSIO_REALTIME;
+  /// One tick in which nothing was measured. @returns as `step`
+  bool pass() noexcept TORSIO_REALTIME;
+
+  /// Root mean square of the first errors in the blocks that have ended, at the end of the last one with a
+  /// measurement; 0 before that.
+  [[nodiscard]] double first_rms() const noexcept { return first_rms_; }
 
  private:
   struct Sums {
     double first = 0.0;
     double second = 0.0;
+    double count = 0.0;
   };
+  bool end_tick() noexcept;
+
   std::vector<Sums> blocks_;
   std::size_t block_ticks_;
   Sums current_;
   std::size_t ticks_ = 0;   ///< in the current block
   std::size_t filled_ = 0;  ///< blocks since the reset, up to all
   std::size_t next_ = 0;    ///< block to be replaced
+  double first_rms_ = 0.0;
 };
 
 }  // namespace torsio::detail
@@ -76,11 +86,25 @@ class ModelAdapter {
 
   /// Trains on the reference of the last step. Call it in every tick, with NaN where there is no
   /// reference.
-  UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
+  /// @param opinion of a `ReferenceCheck`, by which a reference is passed over that has no other fault.
+  UpdateOutcome learn(const ReferenceSample& reference,
+                      UpdateOutcome opinion = UpdateOutcome::updated) noexcept TORSIO_REALTIME;
   /// Counts a tick whose estimate was not the model's: `warming_up` or `no_estimate`.
   UpdateOutcome pass_over(UpdateOutcome reason) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const AdaptationCounts& counts() const noexcept { return counts_; }
+  /// Whether the reference of the last step has no fault by itself.
+  [[nodiscard]] bool accepts(const ReferenceSample& reference) const noexcept TORSIO_REALTIME {
+    return !paused_ && reference.value != last_reference_ &&
+           doubt_about(reference) == UpdateOutcome::updated;
+  }
+  /// The spread of the target in training, its unit.
+  [[nodiscard]] double target_scale() const noexcept { return target_scale_; }
+  /// The value of the frozen model in the last step.
+  [[nodiscard]] double frozen_value() const noexcept { return frozen_value_; }
+  /// RMSE before each update over the last `comparison_s` with references, of the parameters in use; 0
+  /// before the first.
+  [[nodiscard]] double recent_rmse() const noexcept { return comparison_.first_rms(); }
   /// How far the parameters are from the frozen ones; 0 without updates. What it is relative to is
   /// stated by the adapter.
   [[nodiscard]] virtual double relative_change() const noexcept = 0;
@@ -100,8 +124,6 @@ class ModelAdapter {
   ModelAdapter(const ModelAdapter&) = default;
   ModelAdapter& operator=(const ModelAdapter&) = default;
 
-  [[nodiscard]] double target_scale() const noexcept { return target_scale_; }
-
   /// The values of a step; without one, nothing is learned from the reference.
   void begin_step() noexcept { has_step_ = false; }
   void end_step(double frozen_value, double adapted_value) noexcept;
@@ -115,10 +137,13 @@ class ModelAdapter {
   /// Ends what `restore` has begun.
   virtual void restore_at_once() noexcept {}
 
-  [[nodiscard]] UpdateOutcome outcome_of(const ReferenceSample& reference) noexcept;
+  [[nodiscard]] UpdateOutcome outcome_of(const ReferenceSample& reference,
+                                         UpdateOutcome opinion) noexcept;
   /// Why a reference must not be used; `updated` if it may be.
   [[nodiscard]] UpdateOutcome doubt_about(const ReferenceSample& reference) const noexcept;
   void compare(double adapted_error, double frozen_error) noexcept;
+  void compare_nothing() noexcept;
+  void discard_what_was_learned() noexcept;
   void roll_back() noexcept;
   UpdateOutcome counted(UpdateOutcome outcome) noexcept;
 
