@@ -59,6 +59,7 @@ std::vector<Finding> Checker::run_for_failures() {
 }
 
 void Checker::run_checks(bool with_warnings) {
+  if (with_warnings) check_ends();
   check_length();
   if (has_failed()) return;  // too short for the other checks
   check_missing();
@@ -101,6 +102,14 @@ void Checker::pass_unless_found(const std::string& check, std::string message,
   const std::size_t before = findings_.size();
   body();
   if (findings_.size() == before) add(Verdict::pass, check, "", std::move(message));
+}
+
+void Checker::check_ends() {
+  for (const DatasetRecord& record : dataset_.records)
+    if (record.recording.is_unfinished)
+      add(Verdict::warn, "end", record.recording.name(),
+          "the file was not closed: what follows its last whole record is missing",
+          "Was the recorder killed, or the copy stopped? Copy the file again if it was.");
 }
 
 void Checker::check_length() {

@@ -4,9 +4,13 @@
 #include <utility>
 
 #include "check/checker.hpp"
+#include "fit/common/held_out.hpp"
 #include "fit/common/least_samples.hpp"
 #include "fit/common/training_rules.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/fit/common/options.hpp"
+#include "torsio/fit/families.hpp"
 #include "torsio/fit/train_model.hpp"
 
 namespace torsio {
@@ -20,6 +24,24 @@ std::string problem_of(const Error& error) {
 
 }  // namespace
 
+// What a curve over the inputs explains of other samples of the same recordings.
+void Checker::check_determination(const TrainingData& data) {
+  const auto target = split_channel_name(data.target);
+  if (!target || target->unit->si_suffix != "Nm") return;
+  const FamilyInfo& curve = find_family("polynomial");
+  const HeldOutErrors held_out = held_out_errors(data, [&](const TrainingData& rest) {
+    return curve.fit(rest, Options(curve.options, {}), {});
+  });
+  if (!(held_out.rmse > kDetermined * held_out.constant_rmse)) return;
+  add(Verdict::fail, "training data", "",
+      fmt::format("the inputs do not determine {}: a curve fitted to two thirds of each recording "
+                  "has an RMSE "
+                  "of {:.3g} {} in the rest, a constant {:.3g}",
+                  data.target, held_out.rmse, unit_label(data.target), held_out.constant_rmse),
+      "Check that inputs and target are of the same joint and time, and that the torque sensor "
+      "measures.");
+}
+
 // The rules of `fit` are applied, not repeated: what it refuses is a FAIL with its own message.
 void Checker::check_training() {
   if (has_failed()) return;
@@ -27,6 +49,7 @@ void Checker::check_training() {
     try {
       LearningData data = learning_data(dataset_, spec_);
       require_samples(data.training);
+      require_motion(data.training);
       if (dataset_.has_role(Role::test)) data.test = training_data(dataset_, spec_, Role::test);
       std::size_t samples = 0;
       std::size_t finite = 0;
@@ -50,6 +73,7 @@ void Checker::check_training() {
         add(Verdict::warn, "training data", recording, "no sample of it can be used",
             "Check the freshness column of the target and the length of the recording: filters of "
             "the inputs must settle first.");
+      check_determination(data.training);
       data_ = std::move(data);
     } catch (const Error& error) {
       add(Verdict::fail, "training data", "", problem_of(error), error.report().advice);

@@ -82,6 +82,7 @@ class Checker {
   [[nodiscard]] bool stands_still(std::size_t r, const std::string& name) const;
   [[nodiscard]] static bool is_condition(const Recording& recording, const std::string& channel);
   void run_checks(bool with_warnings);
+  void check_ends();
   void check_length();
   void check_missing();
   void check_constant();
@@ -144,6 +145,7 @@ class Checker {
   void report_line(std::size_t r, const RecordLine& line, double spread);
   void check_leak();
   void check_training();
+  void check_determination(const TrainingData& data);
   void check_range();
   [[nodiscard]] bool has_failed() const;
   static constexpr std::size_t kFewSamples = 100;
@@ -183,6 +185,7 @@ class Checker {
   static constexpr double kHighestLoad_Nm = 3000.0;
   static constexpr double kOuter = 0.01;          ///< share of the samples on either side
   static constexpr double kOtherExplained = 0.3;  ///< share of what is unexplained of the target
+  static constexpr double kDetermined = 0.9;      ///< share of the error of a constant
   static constexpr double kWellExplained = 0.02;  ///< share of the variance
 
   const Dataset& dataset_;

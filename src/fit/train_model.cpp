@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <set>
 #include <utility>
 
 #include "fit/common/guards.hpp"
+#include "fit/common/held_out.hpp"
 #include "fit/common/training_rules.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/options.hpp"
@@ -101,6 +103,20 @@ void refuse_wrong_choice(const ModelChoice& choice, const FitContext& context) {
          .advice = "Leave --resume away."});
 }
 
+/// Where what was held out is explained no better than by a constant.
+void note_unexplained(const std::string& target, const HeldOutErrors& held_out,
+                      std::vector<std::string>& notes) {
+  if (!(held_out.rmse > held_out.constant_rmse)) return;
+  notes.push_back(
+      fmt::format("warning: the inputs do not determine {}: fitted to two thirds of each "
+                  "recording, the model has "
+                  "an RMSE of {:.4g} in the rest, and a constant one of {:.4g} in all",
+                  target, held_out.rmse, held_out.constant_rmse));
+}
+
+/// NaN: not measured.
+double larger(double a, double b) { return a >= b || std::isnan(b) ? a : b; }
+
 TrainedModel train(const Dataset& dataset, const LearningData& data, const ModelChoice& choice,
                    FitContext context) {
   const FamilyInfo& family = find_family(choice.family);
@@ -114,15 +130,34 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   refuse_zeros_after_an_inverse(data.training, pipeline, card.zeros);
   if (context.validation == nullptr && data.validation) context.validation = &*data.validation;
 
+  if (family.is_spring && family.name != "linear") require_motion(data.training);
+
   const auto start = std::chrono::steady_clock::now();
   FittedModel fitted = family.fit(data.training, options, context);
   const std::chrono::duration<double> fit_time = std::chrono::steady_clock::now() - start;
 
+  const HeldOutErrors held_out =
+      family.can_resume || context.validation != nullptr
+          ? HeldOutErrors{.rmse = fitted.held_out_rmse}
+          : held_out_errors(data.training, [&](const TrainingData& rest) {
+              FitContext again = context;
+              again.progress = [&](double, std::string_view) {
+                return !context.progress ||
+                       context.progress(1.0, "fitting without what is held out");
+              };
+              return family.fit(rest, options, again);
+            });
+  const FeatureRanges ranges = feature_ranges(data.training);
+  const bool has_memory = !fitted.model.memory({ranges.lowest, ranges.highest}).is_empty();
+  if (family.is_spring && has_memory && !held_out.has_return)
+    refuse_motion_without_return(data.training);
+  note_unexplained(data.training.target, held_out, notes);
   TrainedModel trained{
       .file = {.card = std::move(card),
                .settings = guarded_settings(choice.features, data.training, fitted.model,
                                             data.validation ? &*data.validation : nullptr,
-                                            fitted.held_out_rmse),
+                                            {.rmse = larger(fitted.held_out_rmse, held_out.rmse),
+                                             .error_bar_factor = held_out.error_bar_factor}),
                .parameters = fitted.model.parameters()},
       .notes = std::move(fitted.notes),
       .table = std::move(fitted.table),

@@ -169,7 +169,7 @@ ResidualTable larger_of(const ResidualTable& first, const ResidualTable& second)
 
 EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingData& training,
                                    const AnyModel& model, const TrainingData* validation,
-                                   double held_out_rmse) {
+                                   const HeldOutErrors& held_out) {
   EstimatorSettings settings;
   settings.features = features;
   settings.sample_rate_Hz = training.sample_rate_Hz;
@@ -181,7 +181,12 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   if (model.traits().is_spring) settings.disturbances.largest_step = training.largest_step;
   settings.disturbances.largest_travel = training.largest_travel;
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
-  if (validation == nullptr) widen_to(settings.residuals, held_out_rmse);
+  if (validation == nullptr) widen_to(settings.residuals, held_out.rmse);
+  settings.output.error_bar_factor = held_out.error_bar_factor;
+  settings.output.largest_target = 0.0;
+  for_each_usable(training, [&](std::span<const double>, double target) {
+    settings.output.largest_target = std::max(settings.output.largest_target, std::abs(target));
+  });
   if (!model.memory({settings.ranges.lowest, settings.ranges.highest}).is_declared)
     settings.disturbances.warm_up_s = warm_up_s(model, training, settings.residuals);
   return settings;

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "torsio/core/estimate.hpp"
+#include "fit/common/held_out.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/any_model.hpp"
@@ -36,12 +36,12 @@ void widen_to(ResidualTable& table, double rmse);
 
 /// The estimator settings around a fitted model in its file. The residual table is from
 /// `validation` where given (training residuals are too small for a model with many parameters).
-/// Otherwise it is from training, scaled up to `held_out_rmse` where the fit has computed that and
-/// it is larger. `zeroed_channels` are set by the caller, who has the recordings.
+/// Otherwise it is from training, scaled up to what was held out where that is larger, as
+/// the model's own error bar is. `zeroed_channels` are set by the caller, who has the recordings.
 [[nodiscard]] EstimatorSettings guarded_settings(const FeatureSpec& features,
                                                  const TrainingData& training,
                                                  const AnyModel& model,
                                                  const TrainingData* validation = nullptr,
-                                                 double held_out_rmse = kNotMeasured);
+                                                 const HeldOutErrors& held_out = {});
 
 }  // namespace torsio

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 
+#include "fit/common/usable_table.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -20,6 +22,14 @@ std::set<std::string> zeroed_channels(const Recording& recording) {
   for (const ZeroRule& zero : recording.zeros) channels.insert(zero.channel);
   return channels;
 }
+
+/// Shares of the range of the first input: values that differ by less are one, a distance that is a gap, and
+/// what all gaps may be.
+constexpr double kSameValue = 1e-9;
+constexpr double kGapShare = 1.0 / 40.0;
+constexpr double kLargestGaps = 0.6;
+constexpr std::size_t kFewCodes = 10;
+constexpr std::size_t kFewSamples = 100;
 
 struct Range {
   double lowest = std::numeric_limits<double>::infinity();
@@ -112,6 +122,66 @@ void require_trainable(const TrainingData& data) {
                  .expected = "at least one input that changes",
                  .found = "every input is constant over the training samples",
                  .advice = "Check that the sensors are connected, and --inputs."});
+}
+
+// A step of an encoder is not a gap, however coarse it is.
+void require_motion(const TrainingData& data) {
+  std::vector<double> values;
+  for (const Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < sequence.target.size(); ++n)
+      if (sequence.use[n] != 0) values.push_back(sequence.features(n, 0));
+  if (values.size() < kFewSamples) return;  // another rule
+  std::ranges::sort(values);
+  const double range = values.back() - values.front();
+  double step = range;
+  std::size_t codes = 1;
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (const double gap = values[i] - values[i - 1]; gap > kSameValue * range) {
+      step = std::min(step, gap);
+      ++codes;
+    }
+  const double least = std::max(kGapShare * range, codes < kFewCodes ? 0.0 : 1.5 * step);
+  double in_gaps = 0.0;
+  std::size_t levels = 1;
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (const double gap = values[i] - values[i - 1]; gap > least) {
+      in_gaps += gap;
+      ++levels;
+    }
+  if (!(in_gaps > kLargestGaps * range)) return;
+  throw Error({.place = "input " + data.inputs.front().expression,
+               .expected = "values over its whole range",
+               .found = fmt::format("{} levels, and nothing between them in {:.0f} % of the range",
+                                    levels, 100.0 * in_gaps / range),
+               .advice = "Record motions: load and unload slowly and without a stop. Such data "
+                         "determine a stiffness only (--model linear)."});
+}
+
+std::size_t strokes_of(const TrainingData& data) {
+  const Range range = range_of(
+      data, [](const Sequence& sequence, std::size_t n) { return sequence.features(n, 0); });
+  const double third = (range.highest - range.lowest) / 3.0;
+  std::size_t strokes = 0;
+  int side = 0;
+  for_each_usable(data, [&](std::span<const double> features, double) {
+    const int now = features[0] < range.lowest + third    ? -1
+                    : features[0] > range.highest - third ? 1
+                                                          : 0;
+    if (now == 0 || now == side) return;
+    if (side != 0) ++strokes;
+    side = now;
+  });
+  return strokes;
+}
+
+void refuse_motion_without_return(const TrainingData& data) {
+  throw Error(
+      {.place = "input " + data.inputs.front().expression,
+       .expected = "a motion that comes back to where it was",
+       .found = fmt::format("{} samples, of which the last third is beyond all others",
+                            data.usable_samples()),
+       .advice = "Load and unload several times: otherwise nothing shows the error of a model with "
+                 "memory. Or fit one without memory, such as polynomial."});
 }
 
 std::vector<std::string> unused_recordings(const TrainingData& data) {

@@ -28,6 +28,16 @@ void add_training_files(ModelCard& card, const Dataset& dataset);
 /// or an input has values (or a range of values) that cannot be squared.
 void require_trainable(const TrainingData& data);
 
+/// @throws Error where the first input rests at a few levels, between which nothing was measured: neither
+/// hysteresis nor the curve between the levels can be determined.
+void require_motion(const TrainingData& data);
+
+/// How often the first input moves from the lower third of its range to the upper one, or back.
+[[nodiscard]] std::size_t strokes_of(const TrainingData& data);
+
+/// For a model with memory of which nothing could be held out.
+[[noreturn]] void refuse_motion_without_return(const TrainingData& data);
+
 /// The recordings of which no sample is usable, while others have some.
 [[nodiscard]] std::vector<std::string> unused_recordings(const TrainingData& data);
 

@@ -336,8 +336,9 @@ class Transfer {
     ModelFile file = mapped(base_, of.map);
     if (of.prior > 0.0) file.parameters = parameters_of(of, true);
     const TrainingData data = data_with(of.map.input_scale);
-    const EstimatorSettings fresh = guarded_settings(
-        file.settings.features, data, AnyModel(file.parameters), nullptr, of.held_out_rmse);
+    const EstimatorSettings fresh =
+        guarded_settings(file.settings.features, data, AnyModel(file.parameters), nullptr,
+                         {.rmse = of.held_out_rmse});
     EstimatorSettings& settings = file.settings;
     settings.fallback = fresh.fallback;
     settings.residuals = larger_of(settings.residuals, fresh.residuals);
@@ -346,6 +347,8 @@ class Transfer {
       steps[k] = std::max(steps[k], fresh.disturbances.largest_step[k]);
     settings.disturbances.largest_travel =
         std::max(settings.disturbances.largest_travel, fresh.disturbances.largest_travel);
+    settings.output.largest_target =
+        std::max(settings.output.largest_target, fresh.output.largest_target);
     for (std::size_t i = 0; i < settings.ranges.lowest.size(); ++i) {
       settings.ranges.lowest[i] = std::min(settings.ranges.lowest[i], fresh.ranges.lowest[i]);
       settings.ranges.highest[i] = std::max(settings.ranges.highest[i], fresh.ranges.highest[i]);

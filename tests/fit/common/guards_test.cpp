@@ -138,7 +138,7 @@ TEST(Guards, WidenErrorBarsFromTrainingToWhatTheFitHeldOut) {
   const FeatureSpec spec{.inputs = {"a", "b"}, .definitions = {}};
   const auto mean_square = [&](const TrainingData* validation, double held_out_rmse) {
     const ResidualTable table =
-        guarded_settings(spec, training, model, validation, held_out_rmse).residuals;
+        guarded_settings(spec, training, model, validation, {.rmse = held_out_rmse}).residuals;
     double sum = 0.0;
     for (const double std_dev : table.std_dev) sum += std_dev * std_dev;
     return sum / static_cast<double>(table.std_dev.size());

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <functional>
+
+#include "torsio/core/estimate.hpp"
+#include "torsio/fit/common/family_info.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+
+/// What the last third of each sequence shows of a model that was fitted to the rest of it.
+struct HeldOutErrors {
+  double rmse = kNotMeasured;
+  double constant_rmse = kNotMeasured;  ///< of a constant, in all samples
+  /// Whether the first input was there where it had been before.
+  bool has_return = true;
+  /// Root mean square of error over the model's own error bar, at least 1; 1 for a model without.
+  double error_bar_factor = 1.0;
+};
+
+/// @param fit the family's fitter, with the options and the seed of the model
+/// @returns NaN where the rest does not suffice for a fit, or no sample is left. @throws Cancelled.
+[[nodiscard]] HeldOutErrors held_out_errors(
+    const TrainingData& data, const std::function<FittedModel(const TrainingData&)>& fit);
+
+}  // namespace torsio
