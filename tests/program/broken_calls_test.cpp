@@ -259,7 +259,7 @@ TEST_F(BrokenCalls, CtrlCDuringAnAdaptationLeavesTheOutputUntouched) {
   // P has 8 million numbers: each update takes milliseconds.
   expect_error(shell("timeout --foreground --signal=INT --preserve-status 2 {torsio} adapt "
                      "m.safetensors a.csv "
-                     "--method rls -o old.safetensors --json x.json"),
+                     "--method rls --set confirmation_s=0 -o old.safetensors --json x.json"),
                kInterrupted, "stopped on request");
   EXPECT_EQ(contents("old.safetensors"), "precious");
   EXPECT_EQ(contents("x.json"), "");

@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "stress/references.hpp"
+#include "stress/streams.hpp"
 #include "stress/stress.hpp"
 
 namespace torsio::stress {
@@ -17,7 +19,10 @@ struct Part {
   Outcome (*run)(const Settings&);
 };
 
-constexpr std::array<Part, 0> kParts{};
+constexpr std::array<Part, 2> kParts{{
+    {"streams", random_streams},
+    {"references", wrong_references},
+}};
 
 }  // namespace
 }  // namespace torsio::stress
