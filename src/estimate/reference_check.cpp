@@ -17,9 +17,9 @@ constexpr double kLargestDelay_s = 0.01;
 constexpr double kDelayRemaining = 0.7;
 constexpr double kGeneratingRemaining = 0.97;
 constexpr double kOutlier = 4.0;
-/// Of the least spread: an estimate of the residuals that is not smaller.
+/// The least standard deviation of the residuals, as a share of the least spread.
 constexpr double kStdDevFloor = 0.1;
-/// Of the gain from what it was in the last minute, and of the residuals from one confirmation to the next.
+/// Largest ratios of the gain to what it was in the last minute, and of the residuals between two confirmations.
 constexpr double kLargestChange = 1.2;
 constexpr double kGainTime_s = 60.0;
 constexpr double kLargestSpreading = 2.0;

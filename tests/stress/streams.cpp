@@ -54,7 +54,7 @@ struct Trained {
 struct Tick {
   std::size_t at = 0;
   JointSample sample;
-  double zero_rad = 0.0;  ///< of the gear
+  double zero_rad = 0.0;  ///< zero of the gear angle
   bool is_sound = true;   ///< what the sensors give is right, or is not given
 };
 
@@ -155,12 +155,12 @@ struct Tally {
   double worst_bars = 0.0;
   std::size_t undetectable = 0;
   std::size_t sound = 0;    ///< sound samples after the disturbance has begun
-  std::size_t guarded = 0;  ///< of them, with a fault that the undisturbed run has not
+  std::size_t guarded = 0;  ///< sound samples with a fault that the undisturbed run has not
 };
 
 /// @returns what was wrong with the stream; empty if nothing
-std::string judge(const ModelFile& file, const std::vector<Estimate>& clean,
-                  const std::vector<Tick>& ticks, Tally& tally) {
+std::string problem_of(const ModelFile& file, const std::vector<Estimate>& clean,
+                       const std::vector<Tick>& ticks, Tally& tally) {
   Estimating estimator(make_estimator(file));
   double zero_rad = 0.0;
   std::size_t run = 0;
@@ -181,11 +181,11 @@ std::string judge(const ModelFile& file, const std::vector<Estimate>& clean,
       ++tally.sound;
       if (now.fault != Fault::none) ++tally.guarded;
     }
-    const double bars = std::abs(now.value - then.value) / now.std_dev;
+    const double share = std::abs(now.value - then.value) / now.std_dev;
     const bool is_wrong =
-        now.fault == Fault::none && then.fault == Fault::none && tick.is_sound && bars > kBars;
+        now.fault == Fault::none && then.fault == Fault::none && tick.is_sound && share > kBars;
     run = is_wrong ? run + 1 : 0;
-    if (is_wrong) worst = std::max(worst, bars);
+    if (is_wrong) worst = std::max(worst, share);
     if (run > longest) {
       longest = run;
       longest_at = tick.at;
@@ -278,7 +278,7 @@ Outcome random_streams(const Settings& settings) {
     const auto kind = static_cast<std::size_t>(random.uniform() * 0.999 * kNames.size());
     const Stream stream(recording, begin, static_cast<Disturbance>(kind), random);
     Tally& tally = tallies[fmt::format("{:18} {}", model.family, kNames.at(kind))];
-    const std::string problem = judge(model.file, clean, stream.ticks(), tally);
+    const std::string problem = problem_of(model.file, clean, stream.ticks(), tally);
     ++tally.streams;
     ++outcome.cases;
     if (problem.empty()) continue;

@@ -124,7 +124,7 @@ class MatVerifier {
     Elements elements(content, is_swapped_);
     Elements::Element matrix;
     if (!elements.next(matrix) || matrix.kind != kArrayElement || !elements.is_at_end())
-      refuse(at, "a packed variable that is no array");
+      refuse(at, "a packed variable without an array");
     verify_matrix(matrix.content, at, 0);
   }
 

@@ -68,7 +68,7 @@ HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const M
   double square_sum = 0.0;
   double ratio_sum = 0.0;
   double count = 0.0;
-  double bars = 0.0;
+  double rated = 0.0;
   double returned = 0.0;
   for (std::size_t s = 0; s < data.sequences.size(); ++s) {
     const Sequence& sequence = data.sequences[s];
@@ -87,14 +87,14 @@ HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const M
       count += 1.0;
       if (!(estimate.std_dev > 0.0)) continue;
       ratio_sum += (error / estimate.std_dev) * (error / estimate.std_dev);
-      bars += 1.0;
+      rated += 1.0;
     }
   }
   HeldOutErrors errors{.has_return = returned >= kLeastSamples};
   if (count < kLeastSamples) return errors;
   errors.rmse = std::sqrt(square_sum / count);
   errors.constant_rmse = spread_of(data, taken);
-  if (const double ratio = std::sqrt(ratio_sum / bars); ratio > 1.0 && std::isfinite(ratio))
+  if (const double ratio = std::sqrt(ratio_sum / rated); ratio > 1.0 && std::isfinite(ratio))
     errors.error_bar_factor = ratio;
   return errors;
 }

@@ -11,7 +11,7 @@ namespace torsio {
 /// What the last third of each sequence shows of a model that was fitted to the rest of it.
 struct HeldOutErrors {
   double rmse = kNotMeasured;
-  double constant_rmse = kNotMeasured;  ///< of a constant, in all samples
+  double constant_rmse = kNotMeasured;  ///< error of a constant, in all samples
   /// Whether the first input was there where it had been before.
   bool has_return = true;
   /// Root mean square of error over the model's own error bar, at least 1; 1 for a model without.
