@@ -188,16 +188,22 @@ TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
                                  .sensor_std = 0.01,
                                  .saturation = 100.0,
                                  .largest_change = 0.1,
-                                 .comparison_s = 0.5});
+                                 .comparison_s = 0.5,
+                                 .confirmation_s = 0.0});
     EXPECT_EQ(heap_calls_while_adapting(estimator, frozen, 4000), 0U);
     const AdaptationCounts counts = estimator.adapter().counts();
-    for (std::size_t outcome = 0; outcome < kUpdateOutcomes; ++outcome)
+    constexpr auto kOfTheCheck = static_cast<std::size_t>(UpdateOutcome::reference_unconfirmed);
+    for (std::size_t outcome = 0; outcome < kOfTheCheck; ++outcome)
       // A layer is restored at once.
       EXPECT_EQ(counts.outcomes[outcome] > 0U,
                 outcome != static_cast<std::size_t>(UpdateOutcome::rolling_back))
           << name(static_cast<UpdateOutcome>(outcome));
     EXPECT_GT(counts.roll_backs, 0U);
     EXPECT_EQ(heap_calls_during([&] { estimator.forget(); }), 0U);
+    AdaptiveEstimator checking(settings, example<Lstm>().parameters(),
+                               {.rule = rule, .comparison_s = 1.0, .confirmation_s = 0.5});
+    EXPECT_EQ(heap_calls_while_adapting(checking, frozen, 4000), 0U);
+    EXPECT_GT(checking.adapter().counts().of(UpdateOutcome::reference_unconfirmed), 0U);
   }
 }
 
