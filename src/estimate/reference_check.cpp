@@ -38,7 +38,7 @@ std::size_t ticks_in(double time_s, double period_s) {
 
 void ReferenceCheck::Sums::add(const Sample& sample) noexcept {
   count += 1.0;
-  for (std::size_t i = 0; i < kVariables; ++i) {
+  for (std::size_t i = 0; i < variable_count; ++i) {
     sums[i] += sample[i];
     for (std::size_t j = 0; j <= i; ++j) products[i][j] += sample[i] * sample[j];
   }
@@ -46,7 +46,7 @@ void ReferenceCheck::Sums::add(const Sample& sample) noexcept {
 
 void ReferenceCheck::Sums::add(const Sums& other) noexcept {
   count += other.count;
-  for (std::size_t i = 0; i < kVariables; ++i) {
+  for (std::size_t i = 0; i < variable_count; ++i) {
     sums[i] += other.sums[i];
     for (std::size_t j = 0; j <= i; ++j) products[i][j] += other.products[i][j];
   }
@@ -112,8 +112,9 @@ UpdateOutcome ReferenceCheck::step(double frozen, double first, double reference
   if (has_past && std::isfinite(reference)) {
     if (!has_origin_) origin_ = {frozen, 0.0, first, 0.0, reference};
     has_origin_ = true;
-    const Sample sample{frozen - origin_[kFrozen], frozen - frozen_before, first - origin_[kFirst],
-                        first - first_before, reference - origin_[kReference]};
+    const Sample sample{frozen - origin_[frozen_value], frozen - frozen_before,
+                        first - origin_[first_feature], first - first_before,
+                        reference - origin_[reference_value]};
     current_.all.add(sample);
     if (is_confirmed_ && is_outlier(sample))
       outcome = UpdateOutcome::reference_outlier;
@@ -132,7 +133,7 @@ UpdateOutcome ReferenceCheck::step(double frozen, double first, double reference
 }
 
 bool ReferenceCheck::is_outlier(const Sample& sample) noexcept {
-  const double error = sample[kReference] - line_.offset - line_.gain * sample[kFrozen];
+  const double error = sample[reference_value] - line_.offset - line_.gain * sample[frozen_value];
   const bool found =
       std::abs(error) > kOutlier * std::max(line_.std_dev, kStdDevFloor * least_spread_);
   const double kept =
@@ -184,14 +185,15 @@ UpdateOutcome ReferenceCheck::change_to(const Line& found) const noexcept {
 
 UpdateOutcome ReferenceCheck::verdict(const Sums& total) const noexcept {
   if (total.count < 2.0) return UpdateOutcome::reference_unconfirmed;
-  const double spread = std::sqrt(std::max(0.0, total.covariance(kFrozen, kFrozen)));
+  const double spread = std::sqrt(std::max(0.0, total.covariance(frozen_value, frozen_value)));
   if (!(spread > least_spread_)) return UpdateOutcome::reference_unconfirmed;
-  const double measured = std::sqrt(std::max(0.0, total.covariance(kReference, kReference)));
+  const double measured =
+      std::sqrt(std::max(0.0, total.covariance(reference_value, reference_value)));
   if (!(measured > kDeadShare * spread)) return UpdateOutcome::reference_dead;
-  const double correlation = total.covariance(kFrozen, kReference) / (spread * measured);
+  const double correlation = total.covariance(frozen_value, reference_value) / (spread * measured);
   if (correlation < kOpposite) return UpdateOutcome::reference_opposite;
-  const Delay behind_model = delay(total, kFrozen, kFrozenChange);
-  const Delay behind_deflection = delay(total, kFirst, kFirstChange);
+  const Delay behind_model = delay(total, frozen_value, frozen_change);
+  const Delay behind_deflection = delay(total, first_feature, first_change);
   if (behind_model.delay_s > kLargestDelay_s && behind_model.remaining < kDelayRemaining &&
       behind_deflection.delay_s > 0.0 && behind_deflection.remaining < kGeneratingRemaining)
     return UpdateOutcome::reference_delayed;
@@ -201,11 +203,12 @@ UpdateOutcome ReferenceCheck::verdict(const Sums& total) const noexcept {
   return UpdateOutcome::updated;
 }
 
-ReferenceCheck::Line ReferenceCheck::line(const Sums& total) const noexcept {
-  const double gain = total.covariance(kFrozen, kReference) / total.covariance(kFrozen, kFrozen);
-  const double left =
-      total.covariance(kReference, kReference) - gain * total.covariance(kFrozen, kReference);
-  return {.offset = (total.sums[kReference] - gain * total.sums[kFrozen]) / total.count,
+ReferenceCheck::Line ReferenceCheck::line(const Sums& total) noexcept {
+  const double gain = total.covariance(frozen_value, reference_value) /
+                      total.covariance(frozen_value, frozen_value);
+  const double left = total.covariance(reference_value, reference_value) -
+                      gain * total.covariance(frozen_value, reference_value);
+  return {.offset = (total.sums[reference_value] - gain * total.sums[frozen_value]) / total.count,
           .gain = gain,
           .std_dev = std::sqrt(std::max(0.0, left))};
 }
@@ -216,9 +219,9 @@ ReferenceCheck::Delay ReferenceCheck::delay(const Sums& total, Variable variable
   const double vv = total.covariance(variable, variable);
   const double vc = total.covariance(variable, change);
   const double cc = total.covariance(change, change);
-  const double vr = total.covariance(variable, kReference);
-  const double cr = total.covariance(change, kReference);
-  const double rr = total.covariance(kReference, kReference);
+  const double vr = total.covariance(variable, reference_value);
+  const double cr = total.covariance(change, reference_value);
+  const double rr = total.covariance(reference_value, reference_value);
   const double determinant = vv * cc - vc * vc;
   if (!(determinant > 1e-9 * vv * cc)) return {};
   const double gain = (cc * vr - vc * cr) / determinant;

@@ -44,20 +44,20 @@ class ReferenceCheck {
 
  private:
   enum Variable : std::size_t {
-    kFrozen,
-    kFrozenChange,
-    kFirst,
-    kFirstChange,
-    kReference,
-    kVariables
+    frozen_value,
+    frozen_change,
+    first_feature,
+    first_change,
+    reference_value,
+    variable_count
   };
-  using Sample = std::array<double, kVariables>;
+  using Sample = std::array<double, variable_count>;
 
   /// Sums over the samples of a block of time.
   struct Sums {
     double count = 0.0;
     Sample sums{};
-    std::array<Sample, kVariables> products{};
+    std::array<Sample, variable_count> products{};
 
     void add(const Sample& sample) noexcept;
     void add(const Sums& other) noexcept;
@@ -83,7 +83,7 @@ class ReferenceCheck {
   void clear() noexcept;
   void end_block() noexcept;
   [[nodiscard]] UpdateOutcome verdict(const Sums& total) const noexcept;
-  [[nodiscard]] Line line(const Sums& total) const noexcept;
+  [[nodiscard]] static Line line(const Sums& total) noexcept;
   /// Whether the line can have become this one.
   [[nodiscard]] UpdateOutcome change_to(const Line& found) const noexcept;
   [[nodiscard]] Delay delay(const Sums& total, Variable variable, Variable change) const noexcept;
