@@ -44,21 +44,24 @@ void MemoryError::reset() noexcept {
   is_zero_ = true;
 }
 
+void MemoryError::raise_share(std::size_t relaxation, double towards, double ticks) noexcept {
+  double& share = share_[relaxation];
+  if (!(share < towards)) return;
+  const double decay = decay_[relaxation];
+  share = towards - (towards - share) * (ticks == 1.0 ? decay : std::pow(decay, ticks));
+}
+
 void MemoryError::interrupt(double ticks, double share, bool others) noexcept {
   for (std::size_t k = 0; k < share_.size(); ++k) {
-    const double kept = ticks == 1.0 ? decay_[k] : std::pow(decay_[k], ticks);
     const bool is_first = memory_.relaxations[k].input == 0;
-    const double own = others ? 1.0 : (is_first ? share : 0.0);
-    if (share_[k] < own) share_[k] = own - (own - share_[k]) * kept;
+    raise_share(k, others ? 1.0 : (is_first ? share : 0.0), ticks);
   }
   lose_travel(share, others);
 }
 
 void MemoryError::doubt(double ticks, double share) noexcept {
-  for (std::size_t k = 0; k < share_.size(); ++k) {
-    const double own = memory_.relaxations[k].input == 0 ? share : std::min(share, 1.0);
-    if (share_[k] < own) share_[k] = own - (own - share_[k]) * std::pow(decay_[k], ticks);
-  }
+  for (std::size_t k = 0; k < share_.size(); ++k)
+    raise_share(k, memory_.relaxations[k].input == 0 ? share : std::min(share, 1.0), ticks);
   lose_travel(std::min(share, 1.0), true);
 }
 

@@ -7,7 +7,6 @@
 namespace torsio::detail {
 namespace {
 
-constexpr std::size_t kBlocks = 100;
 constexpr double kChangeTime_s = 0.04;
 constexpr double kDeadShare = 0.25;
 constexpr double kOpposite = -0.5;
@@ -27,11 +26,7 @@ constexpr double kLargestSpreading = 2.0;
 constexpr double kShareTime = 0.2;
 
 double block_time_s(const AdaptationSettings& settings) {
-  return std::max(settings.comparison_s, settings.confirmation_s) / kBlocks;
-}
-
-std::size_t ticks_in(double time_s, double period_s) {
-  return static_cast<std::size_t>(std::clamp(std::ceil(time_s / period_s), 1.0, 1e9));
+  return std::max(settings.comparison_s, settings.confirmation_s) / kMovingBlocks;
 }
 
 }  // namespace
@@ -61,15 +56,15 @@ ReferenceCheck::ReferenceCheck(const AdaptationSettings& settings, double least_
                                double sample_period_s)
     : is_on_(settings.confirmation_s > 0.0),
       least_spread_(least_spread),
-      block_ticks_(ticks_in(block_time_s(settings), sample_period_s)),
-      blocks_(kBlocks) {
+      blocks_(ticks_in(block_time_s(settings), sample_period_s)) {
   const std::size_t change_ticks = ticks_in(kChangeTime_s, sample_period_s);
   change_time_s_ = static_cast<double>(change_ticks) * sample_period_s;
   past_.resize(2 * change_ticks);
   confirmation_blocks_ = static_cast<std::size_t>(
       std::clamp(std::ceil(settings.confirmation_s / block_time_s(settings)), 1.0,
-                 static_cast<double>(kBlocks)));
-  gain_share_ = 1.0 - std::exp(-static_cast<double>(block_ticks_) * sample_period_s / kGainTime_s);
+                 static_cast<double>(kMovingBlocks)));
+  const auto block_ticks = static_cast<double>(ticks_in(block_time_s(settings), sample_period_s));
+  gain_share_ = 1.0 - std::exp(-block_ticks * sample_period_s / kGainTime_s);
   share_decay_ = is_on_ ? std::exp(-sample_period_s / (kShareTime * settings.confirmation_s)) : 0.0;
 }
 
@@ -81,9 +76,8 @@ void ReferenceCheck::reset() noexcept {
 }
 
 void ReferenceCheck::clear() noexcept {
-  for (Block& block : blocks_) block = {};
-  current_ = {};
-  ticks_ = next_ = confirming_ = 0;
+  blocks_.reset();
+  confirming_ = 0;
   is_confirmed_ = false;
   verdict_ = UpdateOutcome::reference_unconfirmed;
   outlier_share_ = 0.0;
@@ -115,11 +109,11 @@ UpdateOutcome ReferenceCheck::step(double frozen, double first, double reference
     const Sample sample{frozen - origin_[frozen_value], frozen - frozen_before,
                         first - origin_[first_feature], first - first_before,
                         reference - origin_[reference_value]};
-    current_.all.add(sample);
+    blocks_.current().all.add(sample);
     if (is_confirmed_ && is_outlier(sample))
       outcome = UpdateOutcome::reference_outlier;
     else
-      current_.inliers.add(sample);
+      blocks_.current().inliers.add(sample);
     if (outlier_share_ > 0.5) {
       clear();
       outcome = UpdateOutcome::reference_outlier;
@@ -143,23 +137,13 @@ bool ReferenceCheck::is_outlier(const Sample& sample) noexcept {
 }
 
 void ReferenceCheck::advance() noexcept {
-  if (++ticks_ < block_ticks_) return;
-  ticks_ = 0;
-  end_block();
+  if (const Block* const ended = blocks_.end_tick()) end_block(*ended);
 }
 
-void ReferenceCheck::end_block() noexcept {
-  if (current_.all.count > 0.0) confirming_ = std::min(confirming_ + 1, kBlocks);
-  blocks_[next_] = current_;
-  current_ = {};
-  next_ = (next_ + 1) % kBlocks;
+void ReferenceCheck::end_block(const Block& ended) noexcept {
+  if (ended.all.count > 0.0) confirming_ = std::min(confirming_ + 1, kMovingBlocks);
   if (confirming_ < confirmation_blocks_) return;
-  Sums all;
-  Sums inliers;
-  for (const Block& block : blocks_) {
-    all.add(block.all);
-    inliers.add(block.inliers);
-  }
+  const auto [all, inliers] = blocks_.total();
   const UpdateOutcome found = verdict(all);
   // Without motion nothing changes.
   if (found == UpdateOutcome::reference_unconfirmed) return;

@@ -33,6 +33,7 @@ std::vector<FamilyInfo> static_families() {
   return {
       family_of<fit_linear>({.name = Linear::kFamily,
                              .summary = "spring with a bias: b + sum k x",
+                             .takes_levels = true,
                              .describe = describe_coefficients}),
       family_of<fit_linear_coulomb>(
           {.name = LinearCoulomb::kFamily,

@@ -114,9 +114,6 @@ void note_unexplained(const std::string& target, const HeldOutErrors& held_out,
                   target, held_out.rmse, held_out.constant_rmse));
 }
 
-/// NaN: not measured.
-double larger(double a, double b) { return a >= b || std::isnan(b) ? a : b; }
-
 TrainedModel train(const Dataset& dataset, const LearningData& data, const ModelChoice& choice,
                    FitContext context) {
   const FamilyInfo& family = find_family(choice.family);
@@ -130,7 +127,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   refuse_zeros_after_an_inverse(data.training, pipeline, card.zeros);
   if (context.validation == nullptr && data.validation) context.validation = &*data.validation;
 
-  if (family.is_spring && family.name != "linear") require_motion(data.training);
+  if (family.is_spring && !family.takes_levels) require_motion(data.training);
 
   const auto start = std::chrono::steady_clock::now();
   FittedModel fitted = family.fit(data.training, options, context);
@@ -147,21 +144,21 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
               };
               return family.fit(rest, options, again);
             });
-  const FeatureRanges ranges = feature_ranges(data.training);
-  const bool has_memory = !fitted.model.memory({ranges.lowest, ranges.highest}).is_empty();
+  EstimatorSettings settings = guarded_settings(
+      choice.features, data.training, fitted.model, data.validation ? &*data.validation : nullptr,
+      {.rmse = std::fmax(fitted.held_out_rmse, held_out.rmse),
+       .error_bar_factor = held_out.error_bar_factor});
+  const bool has_memory =
+      !fitted.model.memory({settings.ranges.lowest, settings.ranges.highest}).is_empty();
   if (family.is_spring && has_memory && !held_out.has_return)
     refuse_motion_without_return(data.training);
   note_unexplained(data.training.target, held_out, notes);
-  TrainedModel trained{
-      .file = {.card = std::move(card),
-               .settings = guarded_settings(choice.features, data.training, fitted.model,
-                                            data.validation ? &*data.validation : nullptr,
-                                            {.rmse = larger(fitted.held_out_rmse, held_out.rmse),
-                                             .error_bar_factor = held_out.error_bar_factor}),
-               .parameters = fitted.model.parameters()},
-      .notes = std::move(fitted.notes),
-      .table = std::move(fitted.table),
-      .fit_seconds = fit_time.count()};
+  TrainedModel trained{.file = {.card = std::move(card),
+                                .settings = std::move(settings),
+                                .parameters = fitted.model.parameters()},
+                       .notes = std::move(fitted.notes),
+                       .table = std::move(fitted.table),
+                       .fit_seconds = fit_time.count()};
   trained.notes.insert(trained.notes.begin(), notes.begin(), notes.end());
   for (const ZeroRule& zero : trained.file.card.zeros)
     if (std::ranges::find(pipeline.raw_inputs(), zero.channel) != pipeline.raw_inputs().end())

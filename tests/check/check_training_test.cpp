@@ -23,19 +23,11 @@ using test::bench_recording;
 
 /// A recording of the bench with changed channels.
 Recording changed(const std::function<void(Channel&)>& change, std::size_t samples = 4000) {
-  const Recording good = bench_recording("changed", {.samples = samples});
-  Recording recording("changed", good.sample_rate_Hz());
-  for (Channel channel : good.channels()) {
-    change(channel);
-    recording.add(std::move(channel));
-  }
-  return recording;
+  return test::changed(bench_recording("changed", {.samples = samples}), change);
 }
 
 Recording with_torque(const std::function<void(Channel&)>& change) {
-  return changed([&](Channel& channel) {
-    if (channel.name == "torque_Nm") change(channel);
-  });
+  return test::with_torque(bench_recording("changed"), change);
 }
 
 Recording stale(std::size_t new_samples) {

@@ -25,6 +25,7 @@ using test::add_record;
 using test::bench_recording;
 using test::dump;
 using test::error_message;
+using test::with_torque;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -126,13 +127,9 @@ TEST(AdaptModel, LearnsFromSegmentsWithTheRoleTrainOnly) {
   EXPECT_EQ(dataset.records[0].segments[1].begin, 15000U);
   const AdaptedModel whole = adapt_model(bench_model(), dataset, settings_for("nlms"));
   // What comes after the lessons, whatever it is, changes nothing.
-  Channel spoilt = dataset.records[0].recording.channel("torque_Nm");
-  Recording changed("lesson", 1000.0);
-  for (std::size_t n = 14000; n < spoilt.values.size(); ++n) spoilt.values[n] = 1.0;
-  for (const char* name : {"gear_angle_rad", "joint_angle_rad"})
-    changed.add(dataset.records[0].recording.channel(name));
-  changed.add(std::move(spoilt));
-  dataset.records[0].recording = std::move(changed);
+  dataset.records[0].recording = with_torque(dataset.records[0].recording, [](Channel& torque) {
+    for (std::size_t n = 14000; n < torque.values.size(); ++n) torque.values[n] = 1.0;
+  });
   const AdaptedModel again = adapt_model(bench_model(), dataset, settings_for("nlms"));
   EXPECT_EQ(dump(whole.file.parameters), dump(again.file.parameters));
   EXPECT_EQ(whole.as_it_ran.back().adapted.rmse, again.as_it_ran.back().adapted.rmse);
@@ -141,20 +138,16 @@ TEST(AdaptModel, LearnsFromSegmentsWithTheRoleTrainOnly) {
 
 TEST(AdaptModel, DoesNotLearnFromHeldAndMissingReferences) {
   Dataset dataset = other_specimen();
-  const Recording& given = dataset.records[0].recording;
-  Recording slow("lesson", 1000.0);
-  Channel torque = given.channel("torque_Nm");
-  torque.fresh.assign(torque.values.size(), 0);
-  for (std::size_t n = 0; n < torque.values.size(); ++n) {
-    if (n % 8 == 0)
-      torque.fresh[n] = 1;
-    else
-      torque.values[n] = torque.values[n - 1];  // 125 Hz
-  }
-  for (std::size_t n = 8000; n < 9600; ++n) torque.values[n] = std::nan("");
-  for (const char* name : {"gear_angle_rad", "joint_angle_rad"}) slow.add(given.channel(name));
-  slow.add(std::move(torque));
-  dataset.records[0].recording = std::move(slow);
+  dataset.records[0].recording = with_torque(dataset.records[0].recording, [](Channel& torque) {
+    torque.fresh.assign(torque.values.size(), 0);
+    for (std::size_t n = 0; n < torque.values.size(); ++n) {
+      if (n % 8 == 0)
+        torque.fresh[n] = 1;
+      else
+        torque.values[n] = torque.values[n - 1];  // 125 Hz
+    }
+    for (std::size_t n = 8000; n < 9600; ++n) torque.values[n] = std::nan("");
+  });
   const AdaptedModel adapted =
       adapt_model(bench_model(), dataset, adaptation_settings("nlms", {{"confirmation_s", "0"}}));
   EXPECT_EQ(adapted.counts.of(UpdateOutcome::reference_not_finite), 1600U);
@@ -168,14 +161,10 @@ TEST(AdaptModel, DoesNotLearnFromHeldAndMissingReferences) {
 Dataset spoilt_specimen(
     const std::function<double(const std::vector<double>&, std::size_t)>& wrong) {
   Dataset dataset = other_specimen();
-  const Recording& given = dataset.records[0].recording;
-  Recording spoilt("lesson", 1000.0);
-  Channel torque = given.channel("torque_Nm");
-  const std::vector<double> right = torque.values;
-  for (std::size_t n = 8000; n < 16000; ++n) torque.values[n] = wrong(right, n);
-  for (const char* name : {"gear_angle_rad", "joint_angle_rad"}) spoilt.add(given.channel(name));
-  spoilt.add(std::move(torque));
-  dataset.records[0].recording = std::move(spoilt);
+  dataset.records[0].recording = with_torque(dataset.records[0].recording, [&](Channel& torque) {
+    const std::vector<double> right = torque.values;
+    for (std::size_t n = 8000; n < 16000; ++n) torque.values[n] = wrong(right, n);
+  });
   return dataset;
 }
 
@@ -275,14 +264,10 @@ Dataset changed_stiffness(double by,
   const test::BenchOptions lesson{.stiffness_Nm_rad = 500.0 * by, .samples = 60000, .seed = 5};
   add_record(dataset, bench_recording("lesson", lesson), Role::train);
   if (sensor) {
-    const Recording given = dataset.records[0].recording;
-    Recording changed("lesson", 1000.0);
-    for (const char* name : {"gear_angle_rad", "joint_angle_rad"}) changed.add(given.channel(name));
-    Channel torque = given.channel("torque_Nm");
-    for (std::size_t n = 0; n < torque.values.size(); ++n)
-      torque.values[n] = sensor(n, torque.values[n]);
-    changed.add(std::move(torque));
-    dataset.records[0].recording = std::move(changed);
+    dataset.records[0].recording = with_torque(dataset.records[0].recording, [&](Channel& torque) {
+      for (std::size_t n = 0; n < torque.values.size(); ++n)
+        torque.values[n] = sensor(n, torque.values[n]);
+    });
   }
   add_record(
       dataset,

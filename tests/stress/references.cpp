@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "data/recording_rows.hpp"
+#include "support/bench_dataset.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
@@ -22,6 +24,8 @@
 
 namespace torsio::stress {
 namespace {
+
+using test::add_record;
 
 constexpr double kWorse = 1.3;
 constexpr std::size_t kAllowed = 2;
@@ -76,21 +80,6 @@ std::vector<double> spoilt(const Channel& torque, double rate_Hz, const WrongRef
   return values;
 }
 
-Recording with_torque(const Recording& recording, std::vector<double> values) {
-  Recording changed(recording.name(), recording.sample_rate_Hz());
-  for (const Channel& channel : recording.channels())
-    if (channel.name != "torque_Nm") changed.add(channel);
-  Channel torque = recording.channel("torque_Nm");
-  torque.values = std::move(values);
-  changed.add(std::move(torque));
-  return changed;
-}
-
-void add(Dataset& dataset, Recording recording, Role role) {
-  const std::size_t samples = recording.size();
-  dataset.records.push_back({std::move(recording), whole_record(samples, role)});
-}
-
 Recording walk(const char* actuator, double duration_s, std::uint64_t seed) {
   return simulate({.actuator = actuator,
                    .experiment = "random-walk",
@@ -122,12 +111,9 @@ double after_loop(const Case& one, const std::vector<double>& reference) {
   for (const std::string& channel : adaptive.settings().zeroed_channels)
     adaptive.set_zero(channel, 0.0);
   const Channel& torque = one.lesson.channel("torque_Nm");
-  std::vector<const Channel*> inputs;
-  for (const std::string& name : adaptive.raw_inputs()) inputs.push_back(&one.lesson.channel(name));
-  std::vector<double> raw(inputs.size());
+  RecordingRows rows(one.lesson, adaptive.raw_inputs());
   for (std::size_t n = 0; n < one.lesson.size(); ++n) {
-    for (std::size_t i = 0; i < raw.size(); ++i) raw[i] = inputs[i]->values[n];
-    (void)adaptive.step(raw);
+    (void)adaptive.step(rows.at(n));
     const bool is_used = torque.is_fresh(n) && static_cast<double>(n) < kEnd_s * rate_Hz;
     (void)adaptive.learn({.value = is_used ? reference[n] : kNotMeasured});
   }
@@ -139,7 +125,10 @@ double after_loop(const Case& one, const std::vector<double>& reference) {
 /// Adapted by `adapt_model`. @returns the frozen error if that refuses
 double after_adapt(const Case& one, std::vector<double> reference) {
   Dataset dataset = one.exam;
-  add(dataset, with_torque(one.lesson, std::move(reference)), Role::train);
+  add_record(
+      dataset,
+      test::with_torque(one.lesson, [&](Channel& torque) { torque.values = std::move(reference); }),
+      Role::train);
   try {
     return rmse_of(adapt_model(one.model, dataset, {.sensor_std = kSensorStd_Nm}).file, one.exam);
   } catch (const Error&) {
@@ -186,13 +175,13 @@ Outcome wrong_references(const Settings& settings) {
   Outcome outcome;
   Dataset training;
   for (std::uint64_t seed = 1; seed <= 2; ++seed)
-    add(training, walk("dfki-50#01", 20.0, 100 * settings.seed + seed), Role::train);
-  add(training,
-      simulate({.actuator = "dfki-50#01",
-                .experiment = "chirp",
-                .seed = settings.seed,
-                .torque_amplitude_Nm = 12.0}),
-      Role::train);
+    add_record(training, walk("dfki-50#01", 20.0, 100 * settings.seed + seed), Role::train);
+  add_record(training,
+             simulate({.actuator = "dfki-50#01",
+                       .experiment = "chirp",
+                       .seed = settings.seed,
+                       .torque_amplitude_Nm = 12.0}),
+             Role::train);
   const FeatureSpec features =
       resolve_inputs(training, {"gear_angle_rad - joint_angle_rad",
                                 "lowpass(rate(gear_angle_rad - joint_angle_rad), 10Hz)"});
@@ -204,7 +193,7 @@ Outcome wrong_references(const Settings& settings) {
                .model = model,
                .lesson = walk(joint, 40.0, 100 * settings.seed + 11),
                .exam = {}};
-      add(one.exam, walk(joint, 20.0, 100 * settings.seed + 12), Role::test);
+      add_record(one.exam, walk(joint, 20.0, 100 * settings.seed + 12), Role::test);
       one.frozen_rmse = rmse_of(model, one.exam);
       run_case(one, true, false, deadline, outcome);
       run_case(one, false, false, deadline, outcome);

@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <utility>
 
 #include "torsio/core/random.hpp"
 #include "torsio/data/dataset.hpp"
@@ -46,6 +48,24 @@ inline Recording bench_recording(const std::string& name, const BenchOptions& op
   recording.add(std::move(joint));
   recording.add(std::move(torque));
   return recording;
+}
+
+/// The recording with changed channels.
+inline Recording changed(const Recording& recording, const std::function<void(Channel&)>& change) {
+  Recording result(recording.name(), recording.sample_rate_Hz());
+  for (Channel channel : recording.channels()) {
+    change(channel);
+    result.add(std::move(channel));
+  }
+  return result;
+}
+
+/// The recording with another torque.
+inline Recording with_torque(const Recording& recording,
+                             const std::function<void(Channel&)>& change) {
+  return changed(recording, [&](Channel& channel) {
+    if (channel.name == "torque_Nm") change(channel);
+  });
 }
 
 inline void add_record(Dataset& dataset, Recording recording, Role role) {

@@ -66,6 +66,11 @@ class ReferenceCheck {
   struct Block {
     Sums all;
     Sums inliers;
+
+    void add(const Block& other) noexcept {
+      all.add(other.all);
+      inliers.add(other.inliers);
+    }
   };
   /// r = a + g f with residuals of this standard deviation.
   struct Line {
@@ -81,7 +86,7 @@ class ReferenceCheck {
 
   void advance() noexcept;
   void clear() noexcept;
-  void end_block() noexcept;
+  void end_block(const Block& ended) noexcept;
   [[nodiscard]] UpdateOutcome verdict(const Sums& total) const noexcept;
   [[nodiscard]] static Line line(const Sums& total) noexcept;
   /// Whether the line can have become this one.
@@ -94,15 +99,11 @@ class ReferenceCheck {
   double change_time_s_;
   double gain_share_;   ///< with which a block changes the usual gain
   double share_decay_;  ///< factor of `outlier_share_` in a tick
-  std::size_t block_ticks_;
   std::size_t confirmation_blocks_;
   std::vector<double> past_;  ///< f and x of the last 40 ms
   std::size_t past_next_ = 0;
   std::size_t past_filled_ = 0;
-  std::vector<Block> blocks_;
-  Block current_;
-  std::size_t ticks_ = 0;
-  std::size_t next_ = 0;
+  MovingSums<Block> blocks_;
   std::size_t confirming_ = 0;  ///< blocks with references since the last `clear`
   Sample origin_{};             ///< first sample, subtracted from all
   bool has_origin_ = false;

@@ -93,6 +93,8 @@ class MemoryError {
   };
 
   void advance(std::span<const double> inputs) noexcept;
+  /// The error of a relaxation approaches this share for so many ticks; it does not decrease.
+  void raise_share(std::size_t relaxation, double towards, double ticks) noexcept;
   /// The travel that is unknown grows by this share of W, in all other inputs to the largest one.
   void lose_travel(double share, bool others) noexcept;
   void update_bound() noexcept;
@@ -272,8 +274,7 @@ class EstimatorCore {
   void visit_state(StateBytes& bytes) noexcept {
     bytes.visit(pipeline_, missed_, poisoned_, last_value_, is_wrong_rate_, needs_reset_, has_run_,
                 in_jump_, has_returned_, zero_changed_, excursion_ticks_, excursion_share_,
-                excursion_travel_, previous_first_, previous_raw_, level_, start_std_dev_,
-                memory_error_);
+                previous_first_, previous_raw_, level_, start_std_dev_, memory_error_);
     bytes.visit(level_ticks_, jump_, offsets_, level_error_);
   }
   /// Differs for the states of estimators with different settings.
@@ -345,9 +346,8 @@ class EstimatorCore {
   std::size_t level_ticks_ = 0;           ///< since the last jump; 0: its level is in use
   bool has_returned_ = false;             ///< the last jump returned to what a motion explains
   bool zero_changed_ = false;             ///< since the last tick
-  double excursion_ticks_ = 0.0;          ///< since the features were inside their ranges
+  double excursion_ticks_ = 0.0;          ///< beyond a width of the range; counted down inside it
   double excursion_share_ = 0.0;          ///< error of the first input in them, if it was wrong
-  double excursion_travel_ = 0.0;         ///< how far the first input moved in them
   double previous_first_ = kNotMeasured;  ///< first feature of the last usable tick
   std::vector<double> previous_raw_;      ///< raw inputs of the last usable tick; NaN: none
   std::vector<double> level_;             ///< raw inputs of the last tick after a jump

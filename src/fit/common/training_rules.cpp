@@ -7,11 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <set>
-#include <span>
 #include <string>
 #include <utility>
 
-#include "fit/common/usable_table.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -155,23 +153,6 @@ void require_motion(const TrainingData& data) {
                                     levels, 100.0 * in_gaps / range),
                .advice = "Record motions: load and unload slowly and without a stop. Such data "
                          "determine a stiffness only (--model linear)."});
-}
-
-std::size_t strokes_of(const TrainingData& data) {
-  const Range range = range_of(
-      data, [](const Sequence& sequence, std::size_t n) { return sequence.features(n, 0); });
-  const double third = (range.highest - range.lowest) / 3.0;
-  std::size_t strokes = 0;
-  int side = 0;
-  for_each_usable(data, [&](std::span<const double> features, double) {
-    const int now = features[0] < range.lowest + third    ? -1
-                    : features[0] > range.highest - third ? 1
-                                                          : 0;
-    if (now == 0 || now == side) return;
-    if (side != 0) ++strokes;
-    side = now;
-  });
-  return strokes;
 }
 
 void refuse_motion_without_return(const TrainingData& data) {

@@ -32,9 +32,6 @@ void require_trainable(const TrainingData& data);
 /// hysteresis nor the curve between the levels can be determined.
 void require_motion(const TrainingData& data);
 
-/// How often the first input moves from the lower third of its range to the upper one, or back.
-[[nodiscard]] std::size_t strokes_of(const TrainingData& data);
-
 /// For a model with memory of which nothing could be held out.
 [[noreturn]] void refuse_motion_without_return(const TrainingData& data);
 

@@ -18,7 +18,6 @@
 #include "core/report_progress.hpp"
 #include "fit/common/folds.hpp"
 #include "fit/common/model_run.hpp"
-#include "fit/common/training_rules.hpp"
 #include "fit/grey_box/grey_box_search.hpp"
 #include "fit/mixture/fit_dgmm.hpp"
 #include "fit/network/fit_network.hpp"

@@ -225,6 +225,21 @@ GreyBoxSums gather_banks(const TrainingData& data, const std::string& schedule,
   return sums;
 }
 
+std::size_t strokes_of(const TrainingData& data) {
+  const auto [low, high] = range_of(data);
+  const double lower = low + (high - low) / 3.0;
+  const double upper = high - (high - low) / 3.0;
+  std::size_t strokes = 0;
+  int side = 0;
+  for_each_usable(data, [&](Features features, double) {
+    const int now = features[0] < lower ? -1 : features[0] > upper ? 1 : 0;
+    if (now == 0 || now == side) return;
+    if (side != 0) ++strokes;
+    side = now;
+  });
+  return strokes;
+}
+
 GreyBoxSums gather_spans(const TrainingData& data, const GreyBoxTerms::Structure& chosen) {
   GreyBoxSums sums = sums_of(data, {}, chosen, false, true);
   sums.is_main_chosen = true;

@@ -54,6 +54,9 @@ struct GreyBoxSums {
 [[nodiscard]] GreyBoxSums gather_banks(const TrainingData& data, const std::string& schedule,
                                        const GreyBoxTerms::Structure& chosen);
 
+/// How often the first input moves from the lower third of its range to the upper one, or back.
+[[nodiscard]] std::size_t strokes_of(const TrainingData& data);
+
 /// Sums of one record over terms that have been chosen, without banks, with its contiguous fifths as
 /// folds: what they have of another motion than the rest is not in neighbouring blocks.
 [[nodiscard]] GreyBoxSums gather_spans(const TrainingData& data,

@@ -12,8 +12,6 @@
 namespace torsio {
 namespace {
 
-constexpr double kMaxTicks = 1e9;
-
 constexpr std::array<std::string_view, kUpdateOutcomes> kNames{"updated",
                                                                "limited",
                                                                "paused",
@@ -80,8 +78,7 @@ AdaptationSettings checked(AdaptationSettings settings, AdaptationRule rule,
 
 /// @param zero what a time of 0 means.
 std::size_t ticks_in(double time_s, double period_s, std::size_t zero) {
-  if (time_s == 0.0) return zero;
-  return static_cast<std::size_t>(std::clamp(std::ceil(time_s / period_s), 1.0, kMaxTicks));
+  return time_s == 0.0 ? zero : detail::ticks_in(time_s, period_s);
 }
 
 }  // namespace

@@ -14,7 +14,6 @@
 
 #include "fit/common/fitted.hpp"
 #include "fit/common/model_run.hpp"
-#include "fit/common/training_rules.hpp"
 #include "fit/grey_box/grey_box_sums.hpp"
 #include "fit/linear/fit_linear.hpp"
 #include "numerics/nnls.hpp"

@@ -57,6 +57,7 @@ struct FamilyInfo {
   /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
   FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&) = nullptr;
   bool is_spring = true;                         ///< `FamilyTraits::is_spring` of its models
+  bool takes_levels = false;                     ///< held levels determine its models
   bool can_resume = false;                       ///< uses `FitContext::resume` and `keep`
   bool only_if_named = false;                    ///< not in `all`: slow, or made for special data
   bool in_search = !only_if_named;               ///< a structure search tries it

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -11,8 +12,56 @@
 
 namespace torsio::detail {
 
-/// Compares two mean square errors over the last stretch of time, in blocks of a hundredth of it:
-/// sums of blocks do not drift, unlike running sums. Nothing is allocated after construction.
+/// Ticks in a time, at least one.
+[[nodiscard]] std::size_t ticks_in(double time_s, double period_s) noexcept;
+
+inline constexpr std::size_t kMovingBlocks = 100;
+
+/// Sums over the last stretch of time, in blocks of a hundredth of it: sums of blocks do not drift, unlike
+/// running sums. Nothing is allocated after construction.
+/// @tparam Sums of a block, with `add(const Sums&)`
+template <class Sums>
+class MovingSums {
+ public:
+  explicit MovingSums(std::size_t block_ticks)
+      : blocks_(kMovingBlocks), block_ticks_(block_ticks) {}
+
+  void reset() noexcept {
+    for (Sums& block : blocks_) block = {};
+    current_ = {};
+    ticks_ = filled_ = next_ = 0;
+  }
+  /// The sums of the present block.
+  [[nodiscard]] Sums& current() noexcept { return current_; }
+  /// One tick. @returns the block that ends with it; null within a block
+  const Sums* end_tick() noexcept TORSIO_REALTIME {
+    if (++ticks_ < block_ticks_) return nullptr;
+    ticks_ = 0;
+    Sums& ended = blocks_[next_];
+    ended = current_;
+    current_ = {};
+    next_ = (next_ + 1) % kMovingBlocks;
+    filled_ = std::min(filled_ + 1, kMovingBlocks);
+    return &ended;
+  }
+  /// Whether as many blocks have ended since the reset as the stretch contains.
+  [[nodiscard]] bool is_full() const noexcept { return filled_ == kMovingBlocks; }
+  [[nodiscard]] Sums total() const noexcept TORSIO_REALTIME {
+    Sums total{};
+    for (const Sums& block : blocks_) total.add(block);
+    return total;
+  }
+
+ private:
+  std::vector<Sums> blocks_;
+  std::size_t block_ticks_;
+  Sums current_{};
+  std::size_t ticks_ = 0;   ///< in the current block
+  std::size_t filled_ = 0;  ///< blocks since the reset, up to all
+  std::size_t next_ = 0;    ///< block to be replaced
+};
+
+/// Compares two mean square errors over the last stretch of time.
 class MovingComparison {
  public:
   /// @param ticks length of the stretch, rounded up to a multiple of 100.
@@ -35,15 +84,15 @@ class MovingComparison {
     double first = 0.0;
     double second = 0.0;
     double count = 0.0;
-  };
-  bool end_tick() noexcept;
 
-  std::vector<Sums> blocks_;
-  std::size_t block_ticks_;
-  Sums current_;
-  std::size_t ticks_ = 0;   ///< in the current block
-  std::size_t filled_ = 0;  ///< blocks since the reset, up to all
-  std::size_t next_ = 0;    ///< block to be replaced
+    void add(const Sums& other) noexcept {
+      first += other.first;
+      second += other.second;
+      count += other.count;
+    }
+  };
+
+  MovingSums<Sums> sums_;
   double first_rms_ = 0.0;
 };
 
