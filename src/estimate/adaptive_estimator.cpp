@@ -31,6 +31,7 @@ void AdaptiveEstimator::forget() noexcept {
 Estimate AdaptiveEstimator::step(std::span<const double> raw) noexcept {
   Estimate estimate = estimator_.step(raw);
   last_fault_ = estimate.fault;
+  if (estimate.fault != Fault::none) return estimate;  // the references were not for its value
   // Also an error bar that is not known, NaN, is at least that.
   if (const double rmse = adapter().recent_rmse(); rmse > 0.0 && !(estimate.std_dev >= rmse))
     estimate.std_dev = rmse;

@@ -109,6 +109,18 @@ TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkChangeNoWeights) {
   EXPECT_EQ(weights<TypeParam>(adaptive.adapted()), weights<TypeParam>(network));
 }
 
+TEST(AdaptiveEstimator, AHeldValueHasNoErrorBar) {
+  const auto network = example<Mlp>().parameters();
+  AdaptiveEstimator adaptive(settings_without_zeros(), network, {.confirmation_s = 0.0});
+  static_cast<void>(
+      run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<Mlp>())), 3.0));
+  ASSERT_GT(adaptive.adapter().recent_rmse(), 0.0);
+  Estimate held;
+  for (int n = 0; n < 100; ++n) held = adaptive.step(std::array{kNaN, 0.0});
+  EXPECT_EQ(held.fault, Fault::input_not_finite);
+  EXPECT_TRUE(std::isnan(held.std_dev));
+}
+
 TEST(AdaptiveEstimator, WaitsForItsZeros) {
   AdaptiveEstimator adaptive(test::example_settings(), example<Mlp>().parameters(),
                              {.confirmation_s = 0.0});
