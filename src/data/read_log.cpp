@@ -92,16 +92,21 @@ Format format_of(std::string_view start, const std::string& path) {
                .advice = "Save one array for each signal: numpy.savez('run.npz', **signals)"});
 }
 
+std::string name_of(const std::string& path) { return path == "-" ? "standard input" : path; }
+
+/// Whether the bytes of the path can be read once more, and in any order.
+bool is_file(const std::string& path) {
+  std::error_code unknown;
+  return path != "-" && std::filesystem::is_regular_file(path, unknown);
+}
+
 /// For formats whose libraries open the file themselves.
 void refuse_pipe(const std::string& path, const char* format) {
-  std::error_code unknown;
-  if (path != "-" && std::filesystem::is_regular_file(path, unknown)) return;
-  throw Error({.place = path == "-" ? "standard input" : path,
+  if (is_file(path)) return;
+  throw Error({.place = name_of(path),
                .problem = std::string(format) + " cannot be read from a pipe",
                .advice = "Give the name of the file."});
 }
-
-std::string name_of(const std::string& path) { return path == "-" ? "standard input" : path; }
 
 /// The files of a folder of rosbag2, in the order of its metadata.
 std::vector<std::string> files_of_bag(const std::filesystem::path& folder,
@@ -176,8 +181,7 @@ class OpenMessages {
 
 std::vector<NamedArray> read_archive(const std::string& path, ByteSource& source,
                                      const ReadLogOptions& options) {
-  std::error_code unknown;
-  if (path != "-" && std::filesystem::is_regular_file(path, unknown)) {
+  if (is_file(path)) {
     const auto bytes = placed_bytes_of(path);
     if (bytes->at(0, kZipMark.size()) == kZipMark)  // not packed once more
       return read_npz(*bytes, path, options.wanted, options.progress);

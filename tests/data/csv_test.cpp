@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
-#include <zlib.h>
 
 #include <bit>
 #include <clocale>
@@ -14,6 +13,7 @@
 
 #include "data/csv/csv_table.hpp"
 #include "support/error_message.hpp"
+#include "support/gzipped.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/write.hpp"
@@ -43,21 +43,6 @@ TEST(ParseCsv, ANumberTooSmallIsZeroAndOneTooLargeIsRefusedWhateverTheLocale) {
   EXPECT_EQ(parse_csv("a_1\n4.9e-324\n", "t").columns[0].values[0], 4.9e-324);
 }
 
-std::string gzipped(const std::string& text) {
-  std::string packed(text.size() + 200, '\0');
-  z_stream stream{};
-  deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
-  std::string copy = text;
-  stream.next_in = reinterpret_cast<Bytef*>(copy.data());
-  stream.avail_in = static_cast<uInt>(copy.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
-}
-
 void expect_two_rows(const LogTable& table) {
   ASSERT_EQ(table.columns.size(), 2U);
   EXPECT_EQ(table.columns[0].name, "t_s");
@@ -80,8 +65,8 @@ INSTANTIATE_TEST_SUITE_P(
         "t_s\ttorque_Nm\n0\t1.5\n0.5\t-2\n", "t_s\ttorque_Nm\n0\t1,5\n0,5\t-2\n",
         "\"t_s\",\"torque_Nm\"\n0,1.5\n0.5,-2\n", "\"t_s\"; \"torque_Nm\"\n\"0\";\"1,5\"\n0,5;-2\n",
         " t_s , torque_Nm\n 0, +1.5 \n .5,-2.\n", "t_s,torque_Nm\n0E0,15e-1\n5e-1,-0.2e+1\n",
-        gzipped("t_s,torque_Nm\n0,1.5\n0.5,-2\n"),
-        gzipped("t_s,torque_Nm\n0,1.5\n") + gzipped("0.5,-2\n")));
+        test::gzipped("t_s,torque_Nm\n0,1.5\n0.5,-2\n"),
+        test::gzipped("t_s,torque_Nm\n0,1.5\n") + test::gzipped("0.5,-2\n")));
 
 TEST(Csv, AQuotedHeaderMayHoldSeparatorsAndQuotes) {
   const LogTable table = parse_csv("\"a,b_rad\",\"the \"\"x\"\"_1\"\n1,2\n", "a.csv");

@@ -8,11 +8,13 @@
 #include <vector>
 
 #include "data/arrays/mat.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/mcap_bytes.hpp"
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "support/error_message.hpp"
 #include "support/file_bytes.hpp"
+#include "support/gzipped.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
@@ -72,6 +74,14 @@ TEST(ReadBudget, EndsManyRowsThatGetManyColumns) {
 TEST(ReadBudget, RefusesJsonThatIsNestedTooDeeply) {
   const std::string deep = std::string(20000, '[') + "1" + std::string(20000, ']');
   EXPECT_THAT(refusal(file_with("jsonschema", "", "json", deep)), HasSubstr("expected json"));
+}
+
+TEST(ReadBudget, EndsAPackedTableOfFewBytes) {
+  constexpr std::size_t kRows = 5 << 20;
+  std::string text = "a_Nm,b_Nm,c_Nm,d_Nm,e_Nm,f_Nm,g_Nm,h_Nm\n";
+  for (std::size_t row = 0; row < kRows; ++row) text += "1,1,1,1,1,1,1,1\n";
+  EXPECT_THAT(error_message([&] { (void)parse_csv(test::gzipped(text), "log.csv.gz"); }),
+              HasSubstr("of memory"));
 }
 
 TEST(ReadBudget, AZeroAfterTheRecordsIsAnError) {

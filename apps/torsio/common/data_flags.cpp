@@ -179,6 +179,7 @@ torsio::Dataset DataFlags::checked(const Load& load) const {
     check_not_read(dataset.files);
     dataset.initialise_samples = initialise;
     remark_on_mapping(dataset);
+    for (const torsio::DatasetRecord& record : dataset.records) remark_on_end(record.recording);
     return dataset;
   } catch (const torsio::Error& error) {
     torsio::ErrorReport report = error.report();
@@ -192,28 +193,19 @@ torsio::Dataset DataFlags::checked(const Load& load) const {
 
 void DataFlags::remark_on_end(const torsio::Recording& recording) {
   if (recording.is_unfinished)
-    remark("warning: " + recording.name() +
-           ": the file was not closed: what follows its last whole record is missing");
+    remark("warning: " + recording.name() + ": " + std::string(torsio::kUnfinishedText));
 }
 
 torsio::Dataset DataFlags::read(const std::vector<std::string>& files,
                                 const std::vector<std::string>& test,
                                 const torsio::LoadOptions& options) const {
-  return checked([&] {
-    torsio::Dataset dataset = torsio::load_dataset(files, test, options);
-    for (const torsio::DatasetRecord& record : dataset.records) remark_on_end(record.recording);
-    return dataset;
-  });
+  return checked([&] { return torsio::load_dataset(files, test, options); });
 }
 
 torsio::Dataset DataFlags::load_inputs(const std::vector<std::string>& channels,
                                        const torsio::Progress& progress) const {
   require_recordings();
-  return checked([&] {
-    torsio::Dataset dataset = torsio::load_inputs(recordings, channels, load_options(progress));
-    for (const torsio::DatasetRecord& record : dataset.records) remark_on_end(record.recording);
-    return dataset;
-  });
+  return checked([&] { return torsio::load_inputs(recordings, channels, load_options(progress)); });
 }
 
 torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,

@@ -20,6 +20,10 @@ class ClockError : public Error {
   using Error::Error;
 };
 
+/// What `Recording::is_unfinished` means, for warnings.
+inline constexpr std::string_view kUnfinishedText =
+    "the file was not closed: what follows its last whole record is missing";
+
 /// How one record is cut into training and test; exactly one of the two ways is set.
 struct SplitRule {
   std::size_t interleaved_blocks = 0;

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "data/arrays/zip_archive.hpp"
+#include "data/arrays/placed_bytes.hpp"
 #include "data/read_budget.hpp"
 
 namespace torsio {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "data/arrays/array_table.hpp"
-#include "data/arrays/zip_archive.hpp"
+#include "data/arrays/placed_bytes.hpp"
 #include "data/byte_source.hpp"
 #include "files/output_file.hpp"
 #include "torsio/core/progress.hpp"

@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "data/arrays/placed_bytes.hpp"
 #include "data/read_budget.hpp"
 #include "files/output_file.hpp"
 
@@ -24,20 +24,6 @@ struct ZipMember {
   std::uint64_t bytes = 0;
   std::uint64_t start = 0;  ///< place of its header in the archive
 };
-
-/// Bytes of a file in any order.
-class PlacedBytes {
- public:
-  virtual ~PlacedBytes() = default;
-  [[nodiscard]] virtual std::uint64_t size() const = 0;
-  /// What there is of these bytes. @throws Error if reading fails.
-  [[nodiscard]] virtual std::string at(std::uint64_t start, std::uint64_t size) const = 0;
-};
-
-/// `bytes` must outlive it.
-[[nodiscard]] std::unique_ptr<PlacedBytes> placed_bytes(std::string_view bytes);
-/// A file that is neither a pipe nor packed. @throws Error if it cannot be opened.
-[[nodiscard]] std::unique_ptr<PlacedBytes> placed_bytes_of(const std::string& path);
 
 /// A ZIP archive, with 64-bit sizes or without. Source: PKWARE, APPNOTE 6.3.
 class ZipArchive {

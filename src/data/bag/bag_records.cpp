@@ -31,26 +31,16 @@ std::string_view field_of(const std::map<std::string_view, std::string_view>& fi
 
 BagRecords::BagRecords(ByteSource& source, const std::string& name, BagLimits limits,
                        Progress progress)
-    : MessageSource(ReadBudget(name, std::move(progress))),
-      source_(source),
-      name_(name),
-      limits_(limits) {
+    : StreamedMessages(source, name, std::move(progress)), limits_(limits) {
   std::string mark;
   if (!read(mark, kBagMark.size()) || mark != kBagMark) refuse("the first bytes are not its mark");
 }
 
 void BagRecords::refuse(const std::string& problem) const {
-  throw Error({.place = fmt::format("{}: byte {}", name_, place_),
+  throw Error({.place = place(),
                .problem = problem,
                .expected = "a bag of ROS 1, version 2.0",
                .advice = "`rosbag reindex` or `rosbag fix` may save the rest."});
-}
-
-bool BagRecords::read(std::string& to, std::size_t size) {
-  const bool is_whole = read_exactly(source_, to, size);
-  budget().read_to(source_.bytes_read());
-  if (is_whole) place_ += size;
-  return is_whole;
 }
 
 std::map<std::string_view, std::string_view> BagRecords::fields_of(std::string_view header) const {

@@ -6,8 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "data/byte_source.hpp"
-#include "data/ros/message_source.hpp"
+#include "data/ros/streamed_messages.hpp"
 
 namespace torsio {
 
@@ -23,7 +22,7 @@ struct BagLimits {
 
 /// The messages of a bag of ROS 1 (version 2.0) in the order of the file, read as a stream; the index
 /// at its end is not used. Chunks are plain, lz4 or bz2. Source: ROS wiki, Bags/Format/2.0.
-class BagRecords final : public MessageSource {
+class BagRecords final : public StreamedMessages {
  public:
   BagRecords(ByteSource& source, const std::string& name, BagLimits limits = {},
              Progress progress = {});
@@ -40,7 +39,6 @@ class BagRecords final : public MessageSource {
 
   /// Reads a record of the file into `record_`. @returns false at the end
   bool read_record(Record& record);
-  bool read(std::string& to, std::size_t size);
   bool next_in_chunk(LogMessage& message);
   bool take(const Record& record, LogMessage& message);
   void add_connection(const Record& record);
@@ -51,10 +49,7 @@ class BagRecords final : public MessageSource {
   [[nodiscard]] Number number(const Record& record, std::string_view field) const;
   [[noreturn]] void refuse(const std::string& problem) const;
 
-  ByteSource& source_;
-  std::string name_;
   BagLimits limits_;
-  std::uint64_t place_ = 0;
   std::string header_;
   std::string data_;
   std::string chunk_;

@@ -10,6 +10,7 @@
 #include "data/csv/decimal.hpp"
 #include "data/csv/line_reader.hpp"
 #include "data/names.hpp"
+#include "data/read_budget.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/data/write.hpp"
@@ -20,8 +21,9 @@ namespace {
 /// Turns lines into rows of a table.
 class TableParser {
  public:
-  TableParser(LogTable& table, const CsvHeader& header, const CsvOptions& options)
-      : table_(table), separator_(header.separator), limits_(options.limits) {
+  TableParser(LogTable& table, const CsvHeader& header, const CsvOptions& options,
+              ReadBudget& budget)
+      : table_(table), separator_(header.separator), limits_(options.limits), budget_(budget) {
     for (std::size_t i = 0; i < header.names.size(); ++i)
       columns_.push_back({.name = header.names[i], .number = i + 1, .values = {}});
     for (const LogColumn& column : columns_)
@@ -54,6 +56,7 @@ class TableParser {
     }
     if (at != end) refuse_ragged(line, number);
     mark(number);
+    budget_.keep(columns_.size() * sizeof(double));
     if (++rows_ * columns_.size() > limits_.values)
       throw Error({.place = fmt::format("{}: line {}", table_.source.file, number),
                    .problem = fmt::format("more than {} numbers", limits_.values),
@@ -146,6 +149,7 @@ class TableParser {
   LogTable& table_;
   char separator_;
   CsvLimits limits_;
+  ReadBudget& budget_;
   std::vector<LogColumn> columns_;
   std::vector<std::uint8_t> read_;
   std::size_t rows_ = 0;
@@ -217,10 +221,14 @@ LogTable read_csv(ByteSource& source, const std::string& name, const CsvOptions&
   refuse_model(first, lines, name);
   const CsvHeader header = parse_header(first, place);
   check_skipped(header, options, place);
-  TableParser parser(table, header, options);
+  ReadBudget budget(name);
+  TableParser parser(table, header, options, budget);
   std::string_view line;
   std::size_t gap_bytes = 0;
   while (lines.next(line, options.limits.line_bytes)) {
+    budget.read_to(source.bytes_read());
+    constexpr std::size_t kBytesPerElement = 16;  // comments of a packed file take time, too
+    budget.work(1 + line.size() / kBytesPerElement);
     if (!is_comment_or_blank(line)) {
       parser.add(line, lines.number());
       gap_bytes = 0;

@@ -48,7 +48,7 @@ int Db3Messages::watch(void* self) noexcept {
 }
 
 Db3Messages::Db3Messages(const std::string& path, Progress progress)
-    : MessageSource(ReadBudget(path, std::move(progress))), path_(path) {
+    : MessageSource(ReadBudget(path, std::move(progress))) {
   std::error_code unknown;
   const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
   if (!unknown) budget().read_to(bytes);
@@ -71,7 +71,7 @@ Db3Messages::Db3Messages(const std::string& path, Progress progress)
 Db3Messages::~Db3Messages() = default;
 
 void Db3Messages::refuse(const std::string& problem) const {
-  throw Error({.place = path_,
+  throw Error({.place = budget().name(),
                .problem = problem,
                .expected = "a database of rosbag2",
                .found = database_ && sqlite3_errcode(database_.get()) != SQLITE_ROW

@@ -50,7 +50,6 @@ class Db3Messages final : public MessageSource {
   void read_topics();
   [[noreturn]] void refuse(const std::string& problem) const;
 
-  std::string path_;
   std::exception_ptr stopped_;  ///< why the database was asked to stop
   std::unique_ptr<sqlite3, CloseDatabase> database_;
   std::map<std::int64_t, MessageChannel> topics_;

@@ -25,27 +25,17 @@ std::uint32_t mcap_checksum(std::string_view bytes, std::uint32_t before) noexce
 
 McapRecords::McapRecords(ByteSource& source, const std::string& name, McapLimits limits,
                          Progress progress)
-    : MessageSource(ReadBudget(name, std::move(progress))),
-      source_(source),
-      name_(name),
-      limits_(limits) {
+    : StreamedMessages(source, name, std::move(progress)), limits_(limits) {
   std::string mark;
   if (!read(mark, kMcapMark.size()) || mark != kMcapMark)
     refuse("the first bytes are not its mark");
 }
 
 void McapRecords::refuse(const std::string& problem) const {
-  throw Error({.place = fmt::format("{}: byte {}", name_, place_),
+  throw Error({.place = place(),
                .problem = problem,
                .expected = "an MCAP file",
                .advice = "`mcap recover` (or `mcap doctor`) may save the rest."});
-}
-
-bool McapRecords::read(std::string& to, std::size_t size) {
-  const bool is_whole = read_exactly(source_, to, size);
-  budget().read_to(source_.bytes_read());
-  if (is_whole) place_ += size;
-  return is_whole;
 }
 
 bool McapRecords::next(LogMessage& message) {

@@ -6,8 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "data/byte_source.hpp"
-#include "data/ros/message_source.hpp"
+#include "data/ros/streamed_messages.hpp"
 
 namespace torsio {
 
@@ -43,7 +42,7 @@ struct McapLimits {
 /// The messages of an MCAP file in the order of the file, read as a stream: the index at its end is
 /// not used, so that the file of a recorder that was killed can be read up to its last whole record.
 /// Chunks are plain, lz4 or zstd; their checksums are verified. Source: MCAP format specification.
-class McapRecords final : public MessageSource {
+class McapRecords final : public StreamedMessages {
  public:
   McapRecords(ByteSource& source, const std::string& name, McapLimits limits = {},
               Progress progress = {});
@@ -54,18 +53,13 @@ class McapRecords final : public MessageSource {
   [[nodiscard]] bool is_unfinished() const noexcept override { return is_unfinished_; }
 
  private:
-  /// Reads `size` bytes into `to`. @returns false if the file ends before.
-  bool read(std::string& to, std::size_t size);
   void read_to_end();
   bool next_in_chunk(LogMessage& message);
   bool take(McapKind kind, std::string_view content, LogMessage& message);
   void open_chunk(std::string_view content);
   [[noreturn]] void refuse(const std::string& problem) const;
 
-  ByteSource& source_;
-  std::string name_;
   McapLimits limits_;
-  std::uint64_t place_ = 0;
   std::string record_;
   std::string chunk_;
   std::size_t chunk_at_ = 0;

@@ -38,6 +38,7 @@ class MessageSource {
   [[nodiscard]] virtual bool is_unfinished() const noexcept { return false; }
   /// For all that is made of the messages, too.
   [[nodiscard]] ReadBudget& budget() noexcept { return budget_; }
+  [[nodiscard]] const ReadBudget& budget() const noexcept { return budget_; }
 
  private:
   ReadBudget budget_;

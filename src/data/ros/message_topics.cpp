@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 #include <sstream>
 #include <utility>
 
 #include "data/names.hpp"
-#include "data/ros/json_nesting.hpp"
+#include "data/ros/json_numbers.hpp"
 #include "data/ros/ros_decoder.hpp"
 #include "data/ros/ros_schema.hpp"
 #include "torsio/core/error.hpp"
@@ -23,22 +22,6 @@ namespace {
 /// Whether a column of that name can be of the topic.
 bool is_of(std::string_view column, std::string_view topic) {
   return column.size() > topic.size() && column.starts_with(topic) && column[topic.size()] == '/';
-}
-
-/// A document takes up to so many times the memory of its text.
-constexpr std::size_t kJsonBytes = 20;
-
-/// The numbers of a JSON message, "/topic/field/sub".
-void set_numbers(const nlohmann::json& value, const std::string& name, TopicTable& table,
-                 ReadBudget& budget) {
-  budget.work(1);
-  if (value.is_number() || value.is_boolean()) {
-    table.set(table.column(name, budget),
-              value.is_boolean() ? (value.get<bool>() ? 1.0 : 0.0) : value.get<double>());
-  } else if (value.is_structured()) {
-    for (const auto& [key, part] : value.items())
-      set_numbers(part, name + "/" + escaped(key), table, budget);
-  }
 }
 
 std::optional<RosEncoding> encoding_of(const MessageChannel& channel) {
@@ -139,12 +122,8 @@ class Topics {
     if (topic.decoder) {
       if (!topic.decoder->decode(message.data, topic.table, *budget_)) refuse(channel, message);
       stamp_ns = topic.decoder->stamp_ns();
-    } else {
-      if (is_nested_too_deeply(message.data)) refuse(channel, message);
-      budget_->require(kJsonBytes * message.data.size());
-      const auto json = nlohmann::json::parse(message.data, nullptr, false);
-      if (json.is_discarded()) refuse(channel, message);
-      set_numbers(json, channel.topic, topic.table, *budget_);
+    } else if (!set_json_numbers(message.data, channel.topic, topic.table, *budget_)) {
+      refuse(channel, message);
     }
     topic.table.end_row(stamp_ns.value_or(message.log_time_ns), messages_, *budget_);
     values_ += topic.table.columns().size();
