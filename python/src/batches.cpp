@@ -112,6 +112,16 @@ class Batch {
   std::atomic<bool> is_in_use_ = false;
 };
 
+}  // namespace
+}  // namespace torsio::python
+
+template <>
+struct pybind11::detail::type_caster<torsio::python::Batch>
+    : InitialisedCaster<torsio::python::Batch> {};
+
+namespace torsio::python {
+namespace {
+
 std::unique_ptr<Batch> batch_of(const Model& model, std::size_t rows,
                                 std::optional<double> rate_Hz) {
   return std::make_unique<Batch>(model.file, rate_of(*model.file, rate_Hz), rows);

@@ -51,6 +51,10 @@ auto interruptible(const Work& work) {
   }
 }
 
+/// An array without its mask (numpy.ma): what is masked was not measured, and is NaN. Other objects are returned as
+/// they are.
+[[nodiscard]] py::object unmasked(const py::handle& object);
+
 /// The text of a path-like object.
 [[nodiscard]] std::string path_text(const py::handle& path);
 [[nodiscard]] bool is_path(const py::handle& object);

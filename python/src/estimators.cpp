@@ -191,10 +191,7 @@ Rows::Rows(const py::handle& object, const std::vector<std::string>& channels,
         refuse("a DataFrame without the column " + channel);
     source = source[py::cast(channels)].attr("to_numpy")();
   }
-  // What is masked was not measured.
-  if (py::hasattr(source, "mask") && py::hasattr(source, "filled"))
-    source = source.attr("astype")("float64").attr("filled")(kNotMeasured);
-  py::array array = py::array::ensure(source);
+  py::array array = py::array::ensure(unmasked(source));
   if (!array) {
     PyErr_Clear();
     refuse(kind_of(object));

@@ -42,6 +42,12 @@ std::string path_text(const py::handle& path) {
   return py::module_::import("os").attr("fspath")(path).cast<std::string>();
 }
 
+py::object unmasked(const py::handle& object) {
+  if (!py::hasattr(object, "mask") || !py::hasattr(object, "filled"))
+    return py::reinterpret_borrow<py::object>(object);
+  return object.attr("astype")("float64").attr("filled")(kNotMeasured);
+}
+
 std::string kind_of(const py::handle& object) {
   if (object.is_none()) return "None";
   const std::string type = py::str(py::type::handle_of(object).attr("__name__"));

@@ -45,8 +45,14 @@ py::array_t<double> times(const Recording& recording) {
   return t_s;
 }
 
-void add_channel(Recording& recording, const std::string& name, const Doubles& values,
+void add_channel(Recording& recording, const std::string& name, const py::object& measured,
                  const std::optional<Flags>& fresh) {
+  const auto values = Doubles::ensure(unmasked(measured));
+  if (!values) {
+    PyErr_Clear();
+    throw UsageError(
+        {.place = name, .expected = "an array of numbers", .found = kind_of(measured)});
+  }
   Channel channel{name, values_of(values, name)};
   if (fresh) {
     if (fresh->ndim() != 1 || fresh->size() != values.size())
@@ -80,6 +86,12 @@ std::vector<Recording> recordings_from_columns(
   });
 }
 
+void warn_of_end(const Recording& recording) {
+  if (!recording.is_unfinished) return;
+  const std::string text = recording.name() + ": " + kUnfinishedText;
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 std::vector<Recording> read(const py::object& path, const py::object& mapping,
                             std::optional<double> rate_Hz, const std::string& target) {
   LoadOptions options;
@@ -87,10 +99,12 @@ std::vector<Recording> read(const py::object& path, const py::object& mapping,
   options.target = target;
   if (!mapping.is_none()) options.mapping = path_text(mapping);
   const std::string file = path_text(path);
-  return interruptible([&](const Progress& progress) {
+  std::vector<Recording> recordings = interruptible([&](const Progress& progress) {
     options.progress = progress;
     return load_recordings(file, options);
   });
+  for (const Recording& recording : recordings) warn_of_end(recording);
+  return recordings;
 }
 
 struct Roles {
@@ -115,7 +129,10 @@ void add_to(Dataset& dataset, const py::handle& item, Role role, const LoadOptio
       return role == Role::test ? load_dataset({}, files, of_file)
                                 : load_dataset(files, {}, of_file);
     });
-    for (DatasetRecord& record : read.records) dataset.records.push_back(std::move(record));
+    for (DatasetRecord& record : read.records) {
+      warn_of_end(record.recording);
+      dataset.records.push_back(std::move(record));
+    }
     if (dataset.input_sets.empty()) dataset.input_sets = read.input_sets;
     if (dataset.label.empty()) dataset.label = read.label;
     if (options.target.empty()) dataset.target = read.target;

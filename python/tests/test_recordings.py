@@ -138,9 +138,30 @@ def test_masked_values_are_not_measured():
     torque = np.ma.masked_array([0.0, 999.0, 2.0, 3.0], mask=[False, True, False, False])
     read = torsio.Recording.from_dict({"torque_Nm": torque}, rate_Hz=1000.0)["torque_Nm"]
     assert np.array_equal(read, [0.0, np.nan, 2.0, 3.0], equal_nan=True)
+    recording = torsio.Recording.from_dict({"torque_Nm": torque}, rate_Hz=1000.0)
+    recording.add("angle_rad", np.ma.masked_array([1, 2, 3, 4], mask=[True, False, False, False]))
+    np.testing.assert_array_equal(recording["angle_rad"], [np.nan, 2.0, 3.0, 4.0])
+    with pytest.raises(torsio.UsageError, match="an array of numbers"):
+        recording.add("speed_rad_s", "fast")
 
 
-@pytest.mark.parametrize("kind", [torsio.Model, torsio.Recording, torsio.Dataset, torsio.Estimator, torsio.Estimate])
+@pytest.mark.parametrize("kind", [torsio.Model, torsio.Recording, torsio.Dataset, torsio.Estimator, torsio.Estimate, torsio.Batch])
 def test_an_object_that_was_not_initialised_is_an_error(kind):
     with pytest.raises(TypeError, match="not initialised"):
         repr(kind.__new__(kind))
+
+
+def test_a_recording_that_was_not_closed_is_read_with_a_warning(tmp_path):
+    def record(kind, content):
+        return bytes([kind]) + len(content).to_bytes(8, "little") + content
+
+    def text(value):
+        return len(value).to_bytes(4, "little") + value
+
+    records = record(4, b"\1\0\0\0" + text(b"/t") + text(b"json") + bytes(4))
+    for n in range(20):
+        stamp = (n * 10_000_000).to_bytes(8, "little")
+        records += record(5, b"\1\0" + bytes(4) + 2 * stamp + b'{"q_rad": %d}' % n)
+    (tmp_path / "cut.mcap").write_bytes(b"\x89MCAP0\r\n" + records)
+    with pytest.warns(UserWarning, match="was not closed"):
+        assert len(torsio.read(tmp_path / "cut.mcap")[0]) == 20
