@@ -6,12 +6,12 @@
 #include "data/mapping/measured_recordings.hpp"
 #include "data/mcap/mcap_records.hpp"
 #include "data/ros/message_topics.hpp"
+#include "fuzz/budget_oracle.hpp"
 #include "torsio/core/error.hpp"
 
 namespace {
 
-/// Whether the bytes are a recording, and not an Error.
-bool is_read(std::string_view bytes) {
+void read(std::string_view bytes) {
   const auto source = torsio::bytes_in_memory(bytes, "fuzz.mcap");
   constexpr double kRateHz = 100.0;
   try {
@@ -20,16 +20,15 @@ bool is_read(std::string_view bytes) {
     static_cast<void>(torsio::measured_recordings(
         torsio::table_of_messages(files, "fuzz.mcap", {.values = 1 << 16}), torsio::Mapping{},
         kRateHz));
-    return true;
   } catch (const torsio::Error&) {
-    return false;
+    return;
   }
 }
 
 }  // namespace
 
-/// Any bytes, and any damaged file of a recorder, are a recording or an Error.
+/// Any bytes, and any damaged file of a recorder, are a recording or an Error within the budget.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static_cast<void>(is_read({reinterpret_cast<const char*>(data), size}));
+  torsio::fuzz::within_budget([&] { read({reinterpret_cast<const char*>(data), size}); });
   return 0;
 }
