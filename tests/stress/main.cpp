@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "stress/degenerate.hpp"
+#include "stress/drifts.hpp"
 #include "stress/references.hpp"
 #include "stress/streams.hpp"
 #include "stress/stress.hpp"
@@ -19,9 +21,11 @@ struct Part {
   Outcome (*run)(const Settings&);
 };
 
-constexpr std::array<Part, 2> kParts{{
+constexpr std::array<Part, 4> kParts{{
     {"streams", random_streams},
     {"references", wrong_references},
+    {"degenerate", degenerate_training},
+    {"drifts", drifting_sensors},
 }};
 
 }  // namespace
