@@ -27,7 +27,7 @@ constexpr double kBars = 5.0;
 constexpr std::size_t kLongest = 50;  ///< ticks
 constexpr double kWatching = 2.0;
 
-/// What a monitor says of one recording, tick by tick.
+/// What a monitor reports of one recording, tick by tick.
 struct Watched {
   std::vector<double> torque_Nm;
   std::vector<double> std_dev_Nm;
@@ -82,11 +82,11 @@ std::string problem_of(const Watched& sound, const Watched& now, std::size_t fir
   for (std::size_t n = first; n < now.state.size(); ++n) {
     if (now.state[n] > kWatching) break;
     const double difference_Nm = std::abs(now.torque_Nm[n] - sound.torque_Nm[n]);
-    const double bars = difference_Nm / now.std_dev_Nm[n];
+    const double error_bars = difference_Nm / now.std_dev_Nm[n];
     const bool is_watching = now.state[n] == kWatching && sound.state[n] == kWatching;
-    run = is_watching && bars > kBars ? run + 1 : 0;
+    run = is_watching && error_bars > kBars ? run + 1 : 0;
     if (is_watching) tally.largest_Nm = std::max(tally.largest_Nm, difference_Nm);
-    if (run > 0) worst = std::max(worst, bars);
+    if (run > 0) worst = std::max(worst, error_bars);
     if (run > longest) {
       longest = run;
       longest_at = n;

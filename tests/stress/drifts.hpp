@@ -5,7 +5,7 @@
 namespace torsio::stress {
 
 /// Monitored joints of which a sensor drifts, slowly or fast. While the monitor watches, the combined torque may differ from
-/// that of the same recording without the drift by more than five error bars for 50 ms at most.
+/// the one of the same recording without the drift by more than five error bars for 50 ms at most.
 Outcome drifting_sensors(const Settings& settings);
 
 }  // namespace torsio::stress
