@@ -13,6 +13,7 @@
 #include "check/checker.hpp"
 #include "fit/common/guards.hpp"
 #include "numerics/parallel.hpp"
+#include "numerics/reversals.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

@@ -12,7 +12,6 @@ namespace torsio {
 namespace {
 
 constexpr std::size_t kJumpNeighbourhood = 3;
-constexpr double kReversalShare = 0.05;
 constexpr double kRestShare = 0.05;
 
 /// Standard deviation of white noise, from the median of third differences.
@@ -166,26 +165,6 @@ Line line_through(const Pair& pair) {
   }
   if (xx > 0.0) line.slope = xy / xx;
   return line;
-}
-
-std::size_t count_reversals(std::span<const double> values, std::size_t most) {
-  const double dead_band = kReversalShare * extent_of(values).width();
-  std::size_t count = 0;
-  double extreme = kNotMeasured;
-  int direction = 0;
-  for (const double value : values) {
-    if (!is_finite(value)) continue;
-    if (!is_finite(extreme)) extreme = value;
-    const double forward = (value - extreme) * (direction == 0 ? 1.0 : direction);
-    if (direction == 0 ? std::abs(forward) > dead_band : forward < -dead_band) {
-      if (direction != 0 && ++count >= most) return count;
-      direction = value > extreme ? 1 : -1;
-      extreme = value;
-    } else if (direction != 0 && forward > 0.0) {
-      extreme = value;
-    }
-  }
-  return count;
 }
 
 std::vector<double> typical_speeds(const std::vector<double>& differences) {

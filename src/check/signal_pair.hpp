@@ -87,10 +87,6 @@ struct Line {
 };
 [[nodiscard]] Line line_through(const Pair& pair);
 
-/// The number of reversals by more than 5 % of the range, counted up to `most`.
-[[nodiscard]] std::size_t count_reversals(
-    std::span<const double> values, std::size_t most = std::numeric_limits<std::size_t>::max());
-
 /// Lower and upper decile of the speeds while moving; empty if nothing moves.
 [[nodiscard]] std::vector<double> typical_speeds(const std::vector<double>& differences);
 

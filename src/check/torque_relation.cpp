@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "check/hysteresis_fit.hpp"
+#include "numerics/reversals.hpp"
 #include "torsio/core/estimate.hpp"
 
 namespace torsio {
@@ -19,7 +20,7 @@ constexpr double kShortestPart = 0.05;  ///< share of the recording
 constexpr double kFlipShare = 0.05;     ///< share of the ranges that each part passes through
 constexpr double kFlipCodes = 5.0;
 constexpr std::size_t kCandidates = 80;
-constexpr std::size_t kFewReversals = 2;
+constexpr std::size_t kFewestReversals = 2;
 constexpr double kChangeLeaves = 0.25;  ///< share of what is unexplained without the change
 constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
 constexpr double kSlopeChange = 0.12;
@@ -153,7 +154,7 @@ std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code, doub
 
 std::optional<RelationChange> find_relation_change(const Pair& pair) {
   const std::size_t reversals = count_reversals(pair.input);
-  if (correlation(pair.input, pair.target) < kClearCorrelation || reversals < kFewReversals)
+  if (correlation(pair.input, pair.target) < kClearCorrelation || reversals < kFewestReversals)
     return {};
   std::vector<double> known = pair.input;
   for (std::size_t i = 0; i < known.size(); ++i)

@@ -11,6 +11,7 @@
 #include "fit/common/guards.hpp"
 #include "fit/common/held_out.hpp"
 #include "fit/common/training_rules.hpp"
+#include "numerics/reversals.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
@@ -147,12 +148,19 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   EstimatorSettings settings = guarded_settings(
       choice.features, data.training, fitted.model, data.validation ? &*data.validation : nullptr,
       {.rmse = std::fmax(fitted.held_out_rmse, held_out.rmse),
-       .error_bar_factor = held_out.error_bar_factor});
+       .error_bar_factor = held_out.error_bar_factor,
+       .own_std_dev = held_out.own_std_dev});
   const bool has_memory =
       !fitted.model.memory({settings.ranges.lowest, settings.ranges.highest}).is_empty();
   if (family.is_spring && has_memory && !held_out.has_return)
     refuse_motion_without_return(data.training);
   note_unexplained(data.training.target, held_out, notes);
+  if (fitted.model.traits().is_spring && least_std_dev(data.training) > 0.0)
+    notes.push_back(
+        fmt::format("warning: {} reverses fewer than {} times: how well the model repeats is not "
+                    "known, and the "
+                    "error bars are the standard deviation of {}",
+                    data.training.inputs.front().expression, kFewReversals, data.training.target));
   TrainedModel trained{.file = {.card = std::move(card),
                                 .settings = std::move(settings),
                                 .parameters = fitted.model.parameters()},

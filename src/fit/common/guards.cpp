@@ -183,6 +183,13 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
   if (validation == nullptr) widen_to(settings.residuals, held_out.rmse);
   settings.output.error_bar_factor = held_out.error_bar_factor;
+  if (model.traits().is_spring) {
+    const double least = least_std_dev(training);
+    for (double& std_dev : settings.residuals.std_dev) std_dev = std::max(std_dev, least);
+    if (held_out.own_std_dev > 0.0)
+      settings.output.error_bar_factor =
+          std::max(settings.output.error_bar_factor, least / held_out.own_std_dev);
+  }
   settings.output.largest_target = 0.0;
   for_each_usable(training, [&](std::span<const double>, double target) {
     settings.output.largest_target = std::max(settings.output.largest_target, std::abs(target));

@@ -11,6 +11,7 @@
 #include "fit/common/model_run.hpp"
 #include "fit/common/usable_table.hpp"
 #include "numerics/metrics_accumulator.hpp"
+#include "numerics/reversals.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -48,6 +49,18 @@ double spread_of(const TrainingData& data) {
   return std::sqrt(std::max(0.0, square_sum / count - mean * mean));
 }
 
+/// How often the first input reverses, over the usable samples.
+std::size_t reversals_of(const TrainingData& data) {
+  std::size_t reversals = 0;
+  for (const Sequence& sequence : data.sequences) {
+    std::vector<double> motion;
+    for (std::size_t n = 0; n < sequence.target.size(); ++n)
+      if (sequence.use[n] != 0) motion.push_back(sequence.features(n, 0));
+    reversals += count_reversals(motion, kFewReversals);
+  }
+  return reversals;
+}
+
 /// The errors on what `rest` does not use. Samples outside its range are not counted: an estimator does not use
 /// the model there.
 HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const TrainingData& rest) {
@@ -59,16 +72,18 @@ HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const T
   };
   MetricsAccumulator errors;
   MetricsAccumulator ratios;
+  MetricsAccumulator own_bars;
   std::size_t returned = 0;
   for (std::size_t s = 0; s < data.sequences.size(); ++s) {
     const Sequence& sequence = data.sequences[s];
     AnyModel own = model;
     const std::vector<Estimate> estimates = run(own, sequence);
     for (std::size_t n = 0; n < estimates.size(); ++n) {
+      const Estimate& estimate = estimates[n];
+      if (estimate.std_dev > 0.0) own_bars.add(estimate.std_dev, 0.0);
       if (sequence.use[n] == 0 || rest.sequences[s].use[n] != 0) continue;
       const std::span<const double> features = sequence.features.row(n);
       if (is_inside(features, 1)) ++returned;
-      const Estimate& estimate = estimates[n];
       if (estimate.fault != Fault::none || !std::isfinite(estimate.value) ||
           !is_inside(features, features.size()))
         continue;
@@ -78,6 +93,7 @@ HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const T
     }
   }
   HeldOutErrors found{.has_return = returned >= kLeastSamples};
+  if (own_bars.metrics().samples > 0) found.own_std_dev = own_bars.metrics().rmse;
   const Metrics metrics = errors.metrics();
   if (metrics.samples < kLeastSamples) return found;
   found.rmse = metrics.rmse;
@@ -88,6 +104,10 @@ HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const T
 }
 
 }  // namespace
+
+double least_std_dev(const TrainingData& data) {
+  return reversals_of(data) < kFewReversals ? spread_of(data) : 0.0;
+}
 
 HeldOutErrors held_out_errors(const TrainingData& data,
                               const std::function<FittedModel(const TrainingData&)>& fit) {

@@ -16,7 +16,12 @@ struct HeldOutErrors {
   bool has_return = true;
   /// Root mean square of error over the model's own error bar, at least 1; 1 for a model without.
   double error_bar_factor = 1.0;
+  double own_std_dev = 0.0;  ///< root mean square of the model's own error bars; 0: it has none
 };
+
+/// Standard deviation of the target, if the first input reverses fewer than `kFewReversals` times: how large the errors
+/// in other motions are is then not known. Else 0.
+[[nodiscard]] double least_std_dev(const TrainingData& data);
 
 /// @param fit the family's fitter, with the options and the seed of the model
 /// @returns NaN where the rest does not suffice for a fit, or no sample is left. @throws Cancelled.
