@@ -227,8 +227,8 @@ LogTable read_csv(ByteSource& source, const std::string& name, const CsvOptions&
   std::size_t gap_bytes = 0;
   while (lines.next(line, options.limits.line_bytes)) {
     budget.read_to(source.bytes_read());
-    constexpr std::size_t kBytesPerElement = 16;  // comments of a packed file take time, too
-    budget.work(1 + line.size() / kBytesPerElement);
+    constexpr std::size_t kTextPerElement = 16;  // comments of a packed file take time, too
+    budget.work(1 + line.size() / kTextPerElement);
     if (!is_comment_or_blank(line)) {
       parser.add(line, lines.number());
       gap_bytes = 0;
