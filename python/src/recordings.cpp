@@ -88,7 +88,7 @@ std::vector<Recording> recordings_from_columns(
 
 void warn_of_end(const Recording& recording) {
   if (!recording.is_unfinished) return;
-  const std::string text = recording.name() + ": " + kUnfinishedText;
+  const std::string text = recording.name() + ": " + std::string(kUnfinishedText);
   if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
 }
 

@@ -145,10 +145,15 @@ def test_masked_values_are_not_measured():
         recording.add("speed_rad_s", "fast")
 
 
-@pytest.mark.parametrize("kind", [torsio.Model, torsio.Recording, torsio.Dataset, torsio.Estimator, torsio.Estimate, torsio.Batch])
+@pytest.mark.parametrize("kind", [torsio.Model, torsio.Recording, torsio.Dataset, torsio.Estimator, torsio.Estimate])
 def test_an_object_that_was_not_initialised_is_an_error(kind):
     with pytest.raises(TypeError, match="not initialised"):
         repr(kind.__new__(kind))
+
+
+def test_a_batch_that_was_not_initialised_is_an_error():
+    with pytest.raises(TypeError, match="not initialised"):
+        len(torsio.Batch.__new__(torsio.Batch))
 
 
 def test_a_recording_that_was_not_closed_is_read_with_a_warning(tmp_path):
