@@ -14,6 +14,7 @@
 #include "fit/common/guards.hpp"
 #include "numerics/parallel.hpp"
 #include "numerics/reversals.hpp"
+#include "torsio/data/load.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
@@ -108,8 +109,7 @@ void Checker::pass_unless_found(const std::string& check, std::string message,
 void Checker::check_ends() {
   for (const DatasetRecord& record : dataset_.records)
     if (record.recording.is_unfinished)
-      add(Verdict::warn, "end", record.recording.name(),
-          "the file was not closed: what follows its last whole record is missing",
+      add(Verdict::warn, "end", record.recording.name(), std::string(kUnfinishedText),
           "Was the recorder killed, or the copy stopped? Copy the file again if it was.");
 }
 

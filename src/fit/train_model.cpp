@@ -158,8 +158,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   if (fitted.model.traits().is_spring && least_std_dev(data.training) > 0.0)
     notes.push_back(
         fmt::format("warning: {} reverses fewer than {} times: how well the model repeats is not "
-                    "known, and the "
-                    "error bars are the standard deviation of {}",
+                    "known, and the error bars are the standard deviation of {}",
                     data.training.inputs.front().expression, kFewReversals, data.training.target));
   TrainedModel trained{.file = {.card = std::move(card),
                                 .settings = std::move(settings),

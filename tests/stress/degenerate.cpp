@@ -214,8 +214,9 @@ Outcome degenerate_training(const Settings& settings) {
         ++tally.refused;
         continue;
       }
-      const ModelFile file =
-          train_model(training, {.family = family, .features = features}, settings.seed).file;
+      const ModelFile file = train_model(training, check.data.value(),
+                                         {.family = family, .features = features}, settings.seed)
+                                 .file;
       problem = problem_of(file, lesson, random, tally);
     } catch (const Error&) {
       ++tally.refused;
@@ -227,13 +228,10 @@ Outcome degenerate_training(const Settings& settings) {
   for (const auto& [name, tally] : tallies)
     outcome.rows.push_back(
         fmt::format("{:36} {:4} trained, {:4} refused, {:3} wrong; at most {:.1f} % beyond {} "
-                    "error bars, {:.2f} "
-                    "of the trained torque",
+                    "error bars, {:.2f} of the trained torque",
                     name, tally.cases, tally.refused, tally.failures, 100.0 * tally.worst_share,
                     kBars, tally.largest_factor));
-  const auto allowed = static_cast<std::size_t>(kAllowed * static_cast<double>(outcome.cases)) + 1;
-  std::vector<std::string>& list = wrong.size() > allowed ? outcome.failures : outcome.rows;
-  list.insert(list.end(), wrong.begin(), wrong.end());
+  outcome.add_wrong(wrong, kAllowed);
   return outcome;
 }
 

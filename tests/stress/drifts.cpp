@@ -76,29 +76,24 @@ struct Tally {
 
 /// @returns what is wrong; empty if nothing
 std::string problem_of(const Watched& sound, const Watched& now, std::size_t first, Tally& tally) {
-  std::size_t run = 0;
-  std::size_t longest = 0;
-  std::size_t longest_at = 0;
+  LongestRun longest;
   double worst = 0.0;
   for (std::size_t n = first; n < now.state.size(); ++n) {
     if (now.state[n] > kWatching) break;
     const double difference_Nm = std::abs(now.torque_Nm[n] - sound.torque_Nm[n]);
     const double error_bars = difference_Nm / now.std_dev_Nm[n];
     const bool is_watching = now.state[n] == kWatching && sound.state[n] == kWatching;
-    run = is_watching && error_bars > kBars ? run + 1 : 0;
+    const bool is_wrong = is_watching && error_bars > kBars;
+    longest.add(is_wrong, n);
     if (is_watching) tally.largest_Nm = std::max(tally.largest_Nm, difference_Nm);
-    if (run > 0) worst = std::max(worst, error_bars);
-    if (run > longest) {
-      longest = run;
-      longest_at = n;
-    }
+    if (is_wrong) worst = std::max(worst, error_bars);
   }
   if (std::ranges::find_if(now.state, [](double of) { return of > kWatching; }) != now.state.end())
     ++tally.stopped;
   tally.worst_bars = std::max(tally.worst_bars, worst);
-  if (longest <= kLongest) return {};
-  return fmt::format("for {} ticks to tick {} beyond {} error bars, up to {:.1f}", longest,
-                     longest_at, kBars, worst);
+  if (longest.ticks() <= kLongest) return {};
+  return fmt::format("for {} ticks to tick {} beyond {} error bars, up to {:.1f}", longest.ticks(),
+                     longest.last(), kBars, worst);
 }
 
 }  // namespace
@@ -156,9 +151,7 @@ Outcome drifting_sensors(const Settings& settings) {
         "{:30} {:4} drifts, {:4} stopped, {:3} wrong; combined torque at most {:.2f} Nm "
         "off before the stop, {:.1f} error bars",
         name, tally.drifts, tally.stopped, tally.failures, tally.largest_Nm, tally.worst_bars));
-  const auto allowed = static_cast<std::size_t>(kAllowed * static_cast<double>(outcome.cases)) + 1;
-  std::vector<std::string>& list = wrong.size() > allowed ? outcome.failures : outcome.rows;
-  list.insert(list.end(), wrong.begin(), wrong.end());
+  outcome.add_wrong(wrong, kAllowed);
   return outcome;
 }
 

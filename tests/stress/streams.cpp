@@ -166,9 +166,7 @@ std::string problem_of(const ModelFile& file, const std::vector<Estimate>& clean
                        const std::vector<Tick>& ticks, Tally& tally) {
   Estimating estimator(make_estimator(file));
   double zero_rad = 0.0;
-  std::size_t run = 0;
-  std::size_t longest = 0;
-  std::size_t longest_at = 0;
+  LongestRun longest;
   double worst = 0.0;
   bool has_wrong_ticks = false;
   bool was_noticed = false;
@@ -187,12 +185,8 @@ std::string problem_of(const ModelFile& file, const std::vector<Estimate>& clean
     const double share = std::abs(now.value - then.value) / now.std_dev;
     const bool is_wrong =
         now.fault == Fault::none && then.fault == Fault::none && tick.is_sound && share > kBars;
-    run = is_wrong ? run + 1 : 0;
+    longest.add(is_wrong, tick.at);
     if (is_wrong) worst = std::max(worst, share);
-    if (run > longest) {
-      longest = run;
-      longest_at = tick.at;
-    }
   }
   tally.worst_bars = std::max(tally.worst_bars, worst);
   // Within the range and the speed of the training nothing can detect a wrong sensor.
@@ -200,9 +194,9 @@ std::string problem_of(const ModelFile& file, const std::vector<Estimate>& clean
     ++tally.undetectable;
     return {};
   }
-  if (longest <= kLongest) return {};
-  return fmt::format("for {} ticks to tick {} beyond {} error bars, up to {:.1f}", longest,
-                     longest_at, kBars, worst);
+  if (longest.ticks() <= kLongest) return {};
+  return fmt::format("for {} ticks to tick {} beyond {} error bars, up to {:.1f}", longest.ticks(),
+                     longest.last(), kBars, worst);
 }
 
 /// A fault that the motion itself does not explain.
@@ -322,9 +316,7 @@ Outcome random_streams(const Settings& settings) {
     outcome.failures.push_back(
         fmt::format("guards take more than {} % of the samples of undisturbed streams",
                     100.0 * kAllowedGuarded));
-  const auto allowed = static_cast<std::size_t>(kAllowed * static_cast<double>(outcome.cases)) + 1;
-  std::vector<std::string>& list = wrong.size() > allowed ? outcome.failures : outcome.rows;
-  list.insert(list.end(), wrong.begin(), wrong.end());
+  outcome.add_wrong(wrong, kAllowed);
   return outcome;
 }
 

@@ -49,7 +49,7 @@ double spread_of(const TrainingData& data) {
   return std::sqrt(std::max(0.0, square_sum / count - mean * mean));
 }
 
-/// How often the first input reverses, over the usable samples.
+/// How often the first input reverses, over the usable samples, counted up to `kFewReversals`.
 std::size_t reversals_of(const TrainingData& data) {
   std::size_t reversals = 0;
   for (const Sequence& sequence : data.sequences) {
@@ -57,6 +57,7 @@ std::size_t reversals_of(const TrainingData& data) {
     for (std::size_t n = 0; n < sequence.target.size(); ++n)
       if (sequence.use[n] != 0) motion.push_back(sequence.features(n, 0));
     reversals += count_reversals(motion, kFewReversals);
+    if (reversals >= kFewReversals) break;
   }
   return reversals;
 }
