@@ -7,6 +7,7 @@
 #include <sys/sysmacros.h>
 #include <unistd.h>
 #include <zlib.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -138,30 +139,34 @@ class MemoryBytes final : public ByteSource {
   Sha256 sha_;
 };
 
-/// Looks at the first two bytes and unpacks what follows if they are gzip's.
-class MaybeGzip final : public ByteSource {
+/// Looks at the first bytes and unpacks what follows if they are those of gzip or zstd.
+class MaybePacked final : public ByteSource {
  public:
-  MaybeGzip(std::unique_ptr<ByteSource> packed, std::string name)
+  MaybePacked(std::unique_ptr<ByteSource> packed, std::string name)
       : packed_(std::move(packed)), name_(std::move(name)), input_(kChunk) {
-    while (filled_ < 2) {
+    while (filled_ < kZstdMark.size()) {
       const std::size_t got = packed_->read(input_.data() + filled_, input_.size() - filled_);
       if (got == 0) break;
       filled_ += got;
     }
-    gzip_ = filled_ >= 2 && input_[0] == '\x1f' && input_[1] == '\x8b';
+    const std::string_view start(input_.data(), filled_);
+    gzip_ = start.starts_with("\x1f\x8b");
     constexpr int kGzipOnly = 16 + MAX_WBITS;
     if (gzip_ && inflateInit2(&stream_, kGzipOnly) != Z_OK)
       throw Error({.place = name_, .problem = "zlib cannot start"});
     stream_.next_in = reinterpret_cast<Bytef*>(input_.data());
     stream_.avail_in = static_cast<uInt>(filled_);
+    if (start.starts_with(kZstdMark)) zstd_.reset(ZSTD_createDCtx());
+    zstd_input_ = {input_.data(), filled_, 0};
   }
-  ~MaybeGzip() override {
+  ~MaybePacked() override {
     if (gzip_) inflateEnd(&stream_);
   }
-  MaybeGzip(const MaybeGzip&) = delete;
-  MaybeGzip& operator=(const MaybeGzip&) = delete;
+  MaybePacked(const MaybePacked&) = delete;
+  MaybePacked& operator=(const MaybePacked&) = delete;
 
   std::size_t read(char* out, std::size_t size) override {
+    if (zstd_) return unpack_zstd(out, size);
     return gzip_ ? unpack(out, size) : pass(out, size);
   }
   std::string sha256() override { return packed_->sha256(); }
@@ -197,6 +202,22 @@ class MaybeGzip final : public ByteSource {
     return wanted - stream_.avail_out;
   }
 
+  std::size_t unpack_zstd(void* out, std::size_t size) {
+    ZSTD_outBuffer to{out, size, 0};
+    while (to.pos == 0 && size > 0) {
+      if (zstd_input_.pos == zstd_input_.size) {
+        zstd_input_ = {input_.data(), packed_->read(input_.data(), input_.size()), 0};
+        if (zstd_input_.size == 0 && !inside_member_) return 0;
+      }
+      const std::size_t left = ZSTD_decompressStream(zstd_.get(), &to, &zstd_input_);
+      if (ZSTD_isError(left) != 0) fail("its zstd data are corrupt");
+      if (zstd_input_.size == 0 && to.pos == 0 && left != 0)
+        fail("it ends in the middle: the file is truncated");
+      inside_member_ = left != 0;  // another frame may follow
+    }
+    return to.pos;
+  }
+
   bool refill() {
     const std::size_t got = packed_->read(input_.data(), input_.size());
     stream_.next_in = reinterpret_cast<Bytef*>(input_.data());
@@ -216,16 +237,18 @@ class MaybeGzip final : public ByteSource {
   bool gzip_ = false;
   bool inside_member_ = false;
   z_stream stream_{};
+  std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> zstd_{nullptr, &ZSTD_freeDCtx};
+  ZSTD_inBuffer zstd_input_{};
 };
 
 }  // namespace
 
 std::unique_ptr<ByteSource> open_bytes(const std::string& path, const Progress& progress) {
-  return std::make_unique<MaybeGzip>(std::make_unique<FileBytes>(path, progress), path);
+  return std::make_unique<MaybePacked>(std::make_unique<FileBytes>(path, progress), path);
 }
 
 std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes, const std::string& name) {
-  return std::make_unique<MaybeGzip>(std::make_unique<MemoryBytes>(bytes), name);
+  return std::make_unique<MaybePacked>(std::make_unique<MemoryBytes>(bytes), name);
 }
 
 bool read_exactly(ByteSource& source, std::string& to, std::size_t size) {

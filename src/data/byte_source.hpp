@@ -22,7 +22,10 @@ class ByteSource {
   [[nodiscard]] virtual std::uint64_t bytes_read() const noexcept = 0;
 };
 
-/// A file or pipe by path, "-" for standard input; unpacked if it starts like gzip. The progress is
+/// The first bytes of what zstd packed.
+inline constexpr std::string_view kZstdMark{"\x28\xb5\x2f\xfd", 4};
+
+/// A file or pipe by path, "-" for standard input; unpacked if it starts like gzip or zstd. The progress is
 /// called with each block and whenever a signal interrupts the wait for one.
 [[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::string& path,
                                                      const Progress& progress = {});
@@ -31,7 +34,7 @@ class ByteSource {
 /// @returns whether there were so many
 [[nodiscard]] bool read_exactly(ByteSource& source, std::string& to, std::size_t size);
 
-/// Bytes in memory, unpacked if they start like gzip. `bytes` must outlive the source.
+/// Bytes in memory, unpacked if they start like gzip or zstd. `bytes` must outlive the source.
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes,
                                                           const std::string& name);
 

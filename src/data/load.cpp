@@ -53,7 +53,7 @@ void keep_needed(Mapping& mapping, const LogTable& table, std::vector<std::strin
   mapping.derive = needed_definitions(mapping.derive, needed);
   std::vector<std::string> left = needed;
   for (const LogColumn& column : table.columns)
-    if (const auto name = split_channel_name(column.name)) left.push_back(name->si());
+    if (const auto name = split_channel_name(column.full_name())) left.push_back(name->si());
   std::erase_if(mapping.channels, [&](const ChannelRule& rule) {
     const auto name = split_channel_name(rule.name);
     const bool is_there = table.find(rule.from) != nullptr;
@@ -116,12 +116,20 @@ std::vector<std::string> columns_of(const Mapping& mapping) {
   return names;
 }
 
+CsvRules csv_rules(const Mapping& mapping) {
+  return {.only_wanted = !mapping.channels.empty(),
+          .missing = mapping.missing,
+          .skip_lines = mapping.skip_lines,
+          .time_format = mapping.clock.format};
+}
+
 /// @param needed the channels that suffice; empty: all of the mapping, and the target
 std::vector<Recording> load(const Log& log, const std::string& target,
                             const std::vector<std::string>& needed, const Progress& progress) {
-  LogTable table =
-      read_log(log.path,
-               {.skip = log.mapping.drop, .wanted = columns_of(log.mapping), .progress = progress});
+  LogTable table = read_log(log.path, {.skip = log.mapping.drop,
+                                       .wanted = columns_of(log.mapping),
+                                       .progress = progress,
+                                       .csv = csv_rules(log.mapping)});
   const bool is_unfinished = table.is_unfinished;
   Mapping mapping = log.mapping;
   if (!needed.empty()) keep_needed(mapping, table, needed);

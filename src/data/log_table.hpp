@@ -11,6 +11,9 @@
 
 namespace torsio {
 
+/// Columns of texts that are a date, a time of day, or both; their values are in seconds.
+enum class TimeKind : std::uint8_t { none, date_time, date, time_of_day };
+
 /// One column of a log without conversion. A missing value is NaN.
 struct LogColumn {
   std::string name;
@@ -18,6 +21,13 @@ struct LogColumn {
   std::vector<double> values;
   /// `Channel::fresh`, where the format has it.
   std::vector<std::uint8_t> fresh = {};
+  TimeKind time = TimeKind::none;
+  std::string_view unit = {};  ///< suffix of a known unit that the file specifies besides the name
+
+  /// Whether name or file specify the unit.
+  [[nodiscard]] bool has_unit() const noexcept;
+  /// The name as torsio writes it, with the unit that the file specifies elsewhere or in brackets.
+  [[nodiscard]] std::string full_name() const;
 };
 
 /// What every reader of a log makes of it: named columns of equal length, and where in the file a
@@ -32,6 +42,10 @@ struct LogTable {
   /// Names end in units. Where they are those of fields, only the columns that the mapping names,
   /// or that have a unit by chance, are channels.
   bool has_units = true;
+  std::vector<std::string> other_columns = {};  ///< names of those that are not read, for messages
+  std::vector<std::string> notes = {};          ///< what reading assumed, in sentences
+  /// "z (complex numbers)": arrays that are not read, and why.
+  std::vector<std::string> not_read = {};
   bool is_unfinished = false;  ///< the recorder was stopped before it closed the file
 
   [[nodiscard]] std::size_t rows() const noexcept {
@@ -39,11 +53,15 @@ struct LogTable {
   }
   [[nodiscard]] const LogColumn* find(std::string_view name) const noexcept;
   [[nodiscard]] std::size_t line_of(std::size_t row) const noexcept;
-  [[nodiscard]] std::string column_list() const;  ///< for error messages
+  [[nodiscard]] std::vector<std::string> column_names() const;  ///< also of those that are not read
+  [[nodiscard]] std::string column_list() const;                ///< for error messages
   /// "sweep.csv: line 12, column 3 (torque_Nm)", "run.mcap: message 12, /imu/x"
   [[nodiscard]] std::string place(std::size_t row, const LogColumn& column) const;
   [[nodiscard]] std::string header_place(const LogColumn& column) const;
   [[nodiscard]] std::string header_place() const;
 };
+
+/// The note on columns that nothing names, and that have no unit.
+[[nodiscard]] std::string note_of_left_out(const std::vector<std::string>& columns);
 
 }  // namespace torsio

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -18,8 +19,10 @@
 #include "data/byte_source.hpp"
 #include "data/csv/csv_table.hpp"
 #include "data/db3/db3_messages.hpp"
+#include "data/foreign_format.hpp"
 #include "data/log_summary.hpp"
 #include "data/mcap/mcap_records.hpp"
+#include "data/names.hpp"
 #include "data/ros/message_topics.hpp"
 #include "data/yaml_reader.hpp"
 #include "torsio/core/error.hpp"
@@ -31,8 +34,8 @@ namespace {
 class PeekedBytes final : public ByteSource {
  public:
   explicit PeekedBytes(std::unique_ptr<ByteSource> source) : source_(std::move(source)) {
-    constexpr std::size_t kLongestMark = 16;
-    start_.resize(kLongestMark);
+    constexpr std::size_t kStartBytes = 4096;  // marks are shorter, but not lines of JSON
+    start_.resize(kStartBytes);
     std::size_t size = 0;
     while (size < start_.size()) {
       const std::size_t got = source_->read(start_.data() + size, start_.size() - size);
@@ -61,35 +64,26 @@ class PeekedBytes final : public ByteSource {
   std::size_t given_ = 0;
 };
 
-enum class Format : std::uint8_t { text, mcap, bag, db3, npz, mat, hdf5 };
+enum class Format : std::uint8_t { text, mcap, bag, db3, npz, mat };
 
 struct Mark {
   std::string_view mark;
   Format format;
 };
 
-constexpr std::array<Mark, 7> kMarks{{{kMcapMark, Format::mcap},
+constexpr std::array<Mark, 6> kMarks{{{kMcapMark, Format::mcap},
                                       {kBagMark, Format::bag},
                                       {kDb3Mark, Format::db3},
                                       {kZipMark, Format::npz},
                                       {"MATLAB 5.0 MAT", Format::mat},
-                                      {"MATLAB 7.3 MAT", Format::mat},
-                                      {"\x89HDF\r\n", Format::hdf5}}};
+                                      {"MATLAB 7.3 MAT", Format::mat}}};
 
 /// By the first bytes; MATLAB's version 4 has none that are its own, and other programs leave them
 /// out of version 7.3.
 Format format_of(std::string_view start, const std::string& path) {
   for (const Mark& mark : kMarks)
-    if (start.starts_with(mark.mark) && (mark.format != Format::hdf5 || !path.ends_with(".mat")))
-      return mark.format;
+    if (start.starts_with(mark.mark)) return mark.format;
   return path.ends_with(".mat") ? Format::mat : Format::text;
-}
-
-[[noreturn]] void refuse_hdf5(const std::string& name) {
-  throw Error({.place = name,
-               .expected = "CSV, MCAP, .npz, .mat, or a bag of ROS",
-               .found = "an HDF5 file",
-               .advice = "Save one array for each signal: numpy.savez('run.npz', **signals)"});
 }
 
 std::string name_of(const std::string& path) { return path == "-" ? "standard input" : path; }
@@ -108,21 +102,64 @@ void refuse_pipe(const std::string& path, const char* format) {
                .advice = "Give the name of the file."});
 }
 
+constexpr std::array<std::string_view, 6> kEndingsOfMessages{".mcap", ".mcap.zstd", ".mcap.zst",
+                                                             ".db3",  ".db3.zstd",  ".db3.zst"};
+
+bool is_equal(const YamlValue& value, std::string_view upper_or_lower) {
+  const std::string text = value.is_scalar() ? value.texts_or_empty().front() : std::string();
+  return std::ranges::equal(text, upper_or_lower, [](unsigned char a, unsigned char b) {
+    return std::tolower(a) == std::tolower(b);
+  });
+}
+
+/// A file of the metadata; it may have been unpacked, or packed, since.
+std::string present_file(std::string path) {
+  constexpr std::string_view kPacked = ".zstd";
+  std::error_code absent;
+  if (std::filesystem::exists(path, absent)) return path;
+  std::string other = path.ends_with(kPacked) ? path.substr(0, path.size() - kPacked.size())
+                                              : path + std::string(kPacked);
+  return std::filesystem::exists(other, absent) ? other : path;
+}
+
+/// The only file of messages in a folder whose recorder was stopped before it wrote the metadata.
+std::string only_file_of_bag(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code unreadable;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, unreadable)) {
+    const std::string name = entry.path().filename().string();
+    if (std::ranges::any_of(kEndingsOfMessages,
+                            [&](std::string_view ending) { return name.ends_with(ending); }))
+      names.push_back(name);
+  }
+  std::ranges::sort(names);
+  if (names.size() == 1) return (folder / names.front()).string();
+  throw Error({.place = folder.string(),
+               .expected = "a file, or a folder of rosbag2 with metadata.yaml",
+               .found = names.empty() ? "another folder"
+                                      : "a folder without it, with the files " + joined(names),
+               .advice = names.empty() ? "Name the files in it."
+                                       : "Name one of the files, or write the metadata:  ros2 bag "
+                                         "reindex " +
+                                             folder.string()});
+}
+
 /// The files of a folder of rosbag2, in the order of its metadata.
 std::vector<std::string> files_of_bag(const std::filesystem::path& folder,
                                       const Progress& progress) {
   const std::string metadata = (folder / "metadata.yaml").string();
   std::error_code absent;
-  if (!std::filesystem::exists(metadata, absent))
-    throw Error({.place = folder.string(),
-                 .expected = "a file, or a folder of rosbag2 with metadata.yaml",
-                 .found = "another folder"});
-  const YamlValue paths = YamlValue::read(metadata, progress)
-                              .at("rosbag2_bagfile_information")
-                              .at("relative_file_paths");
+  if (!std::filesystem::exists(metadata, absent)) return {only_file_of_bag(folder)};
+  const YamlValue bag = YamlValue::read(metadata, progress).at("rosbag2_bagfile_information");
+  const auto mode = bag.find("compression_mode");
+  const auto format = bag.find("compression_format");
+  if (mode && format && is_equal(*mode, "MESSAGE") && !is_equal(*format, "zstd"))
+    format->refuse("zstd, or no compression of messages",
+                   "Convert the bag with  ros2 bag convert  to one without compression.");
+  const YamlValue paths = bag.at("relative_file_paths");
   std::vector<std::string> files;
   for (const std::string& file : paths.texts())
-    files.push_back((folder / std::filesystem::path(file).filename()).string());
+    files.push_back(present_file((folder / std::filesystem::path(file).filename()).string()));
   if (files.empty()) paths.refuse("at least one file");
   return files;
 }
@@ -150,6 +187,11 @@ struct OpenFiles {
   }
 };
 
+void refuse_if_foreign(const OpenFiles& files) {
+  for (std::size_t i = 0; i < files.paths.size(); ++i)
+    refuse_foreign_format(files.sources[i]->start(), name_of(files.paths[i]));
+}
+
 /// The messages of files of one format.
 class OpenMessages {
  public:
@@ -169,9 +211,10 @@ class OpenMessages {
       sources_.push_back(std::make_unique<McapRecords>(bytes, name, McapLimits{}, progress));
     } else if (format == Format::bag) {
       sources_.push_back(std::make_unique<BagRecords>(bytes, name, BagLimits{}, progress));
-    } else {
-      refuse_pipe(path, "a database");
+    } else if (is_file(path) && placed_bytes_of(path)->at(0, kDb3Mark.size()) == kDb3Mark) {
       sources_.push_back(std::make_unique<Db3Messages>(path, progress));
+    } else {
+      sources_.push_back(std::make_unique<Db3Messages>(bytes, name, progress));
     }
   }
 
@@ -179,8 +222,8 @@ class OpenMessages {
   std::vector<NamedMessages> named_;
 };
 
-std::vector<NamedArray> read_archive(const std::string& path, ByteSource& source,
-                                     const ReadLogOptions& options) {
+ReadArrays read_archive(const std::string& path, ByteSource& source,
+                        const ReadLogOptions& options) {
   if (is_file(path)) {
     const auto bytes = placed_bytes_of(path);
     if (bytes->at(0, kZipMark.size()) == kZipMark)  // not packed once more
@@ -206,8 +249,10 @@ LogTable read_log(const std::string& path, const ReadLogOptions& options) {
   const OpenFiles files(path, options.progress);
   const std::string name = name_of(path);
   const Format format = files.format();
-  if (format == Format::text) return read_csv(*files.sources.front(), name, {.skip = options.skip});
-  if (format == Format::hdf5) refuse_hdf5(name);
+  refuse_if_foreign(files);
+  if (format == Format::text)
+    return read_csv(*files.sources.front(), name,
+                    {.skip = options.skip, .wanted = options.wanted, .rules = options.csv});
   LogTable table;
   if (has_messages(format)) {
     const OpenMessages messages(files, format, options.progress);
@@ -217,8 +262,8 @@ LogTable read_log(const std::string& path, const ReadLogOptions& options) {
         table_of_arrays(read_archive(path, *files.sources.front(), options), name, options.wanted);
   } else {
     refuse_pipe(path, "a MATLAB file");
-    std::vector<NamedArray> arrays = read_mat(path, options.wanted, options.progress);
-    if (!has_all(arrays, options.wanted)) arrays = read_mat(path, {}, options.progress);
+    ReadArrays arrays = read_mat(path, options.wanted, options.progress);
+    if (!has_all(arrays.arrays, options.wanted)) arrays = read_mat(path, {}, options.progress);
     table = table_of_arrays(std::move(arrays), name, options.wanted);
   }
   table.source.sha256 = files.sha256();
@@ -228,6 +273,7 @@ LogTable read_log(const std::string& path, const ReadLogOptions& options) {
 LogSummary list_log(const std::string& path, const Progress& progress) {
   const OpenFiles files(path, progress);
   const Format format = files.format();
+  refuse_if_foreign(files);
   if (!has_messages(format))
     throw Error({.place = name_of(path),
                  .expected = "a file of messages: MCAP, a bag of ROS 1, or the folder or database "

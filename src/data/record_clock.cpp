@@ -6,12 +6,15 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "data/finest_step.hpp"
 #include "data/inspect_clock.hpp"
 #include "data/interpolate.hpp"
 #include "data/log_table.hpp"
+#include "data/mapping/column_advice.hpp"
+#include "data/names.hpp"
 #include "data/resample.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/load.hpp"
@@ -188,6 +191,23 @@ void refuse_gaps(const Stamps& stamps) {
   }
 }
 
+/// The mapping of the first column that may be the clock.
+std::string advice_on_clock(const LogTable& table) {
+  constexpr const char* kRate =
+      "Give the sample rate: --rate 1000, or  rate: 1000Hz  in a mapping.";
+  for (const LogColumn& column : table.columns)
+    if (column.time != TimeKind::none)
+      return fmt::format("Name the column that is the clock in a mapping:  channels: {{t_s: {}}}",
+                         yaml_name(column.name));
+  const std::vector<std::string> names = table.column_names();
+  const auto clock =
+      std::ranges::find_if(names, [](const auto& name) { return is_like_clock(name); });
+  if (clock == names.end()) return kRate;
+  return fmt::format(
+      "If '{}' is the clock, write in a mapping  channels: {{t_s: {{from: {}, unit: UNIT}}}}\n  {}",
+      printable(*clock), yaml_name(*clock), kRate);
+}
+
 double given_rate(const LogTable& table, const Mapping& mapping, double rate_Hz) {
   const double rate = mapping.rate_Hz > 0.0 ? mapping.rate_Hz : rate_Hz;
   if (rate > 0.0) return rate;
@@ -195,7 +215,7 @@ double given_rate(const LogTable& table, const Mapping& mapping, double rate_Hz)
                .problem = "the log has no clock",
                .expected = "a column t_s (or t_ms, time_us ...)",
                .found = "the columns " + table.column_list(),
-               .advice = "Give the sample rate: --rate 1000, or  rate: 1000Hz  in a mapping."});
+               .advice = advice_on_clock(table)});
 }
 
 }  // namespace

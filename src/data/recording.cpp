@@ -31,7 +31,8 @@ const Channel& Recording::channel(std::string_view name) const {
   const std::vector<std::string> names = channel_names(channels_);
   throw Error({.place = name_,
                .problem = fmt::format("there is no channel '{}'", name),
-               .found = "the channels " + joined(names),
+               .found = "the channels " + joined(names) +
+                        (not_read.empty() ? "" : "; not read: " + listed(not_read)),
                .advice = did_you_mean(name, names)});
 }
 

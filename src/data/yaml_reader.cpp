@@ -142,6 +142,13 @@ std::vector<std::string> YamlValue::texts() const {
   return all;
 }
 
+std::vector<std::string> YamlValue::texts_or_empty() const {
+  std::vector<std::string> all;
+  for (const YamlValue& item : items())
+    all.push_back(item.is_scalar() && item.node_.Scalar().empty() ? std::string() : item.text());
+  return all;
+}
+
 std::string YamlValue::text() const {
   if (!node_.IsScalar() || node_.Scalar().empty()) refuse("text");
   return scalar();

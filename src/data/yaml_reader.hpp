@@ -48,6 +48,8 @@ class YamlValue {
   [[nodiscard]] std::vector<YamlValue> items()
       const;  ///< items of a list; a scalar is a list of one
   [[nodiscard]] std::vector<std::string> texts() const;
+  /// The same where a text may be empty.
+  [[nodiscard]] std::vector<std::string> texts_or_empty() const;
   [[nodiscard]] std::string text() const;
   /// A number in the SI unit, which may carry another unit of the same quantity.
   [[nodiscard]] double number(std::string_view si_unit = "1") const;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "data/csv/csv_table.hpp"
+#include "data/csv/time_stamp.hpp"
 #include "support/error_message.hpp"
 #include "support/gzipped.hpp"
 #include "support/temporary_folder.hpp"
@@ -85,12 +86,195 @@ TEST(Csv, EmptyCellsAndNanAreMissingValues) {
   EXPECT_EQ(table.columns[2].values[1], 3.0);
 }
 
+TEST(Csv, MarksOfMissingValuesAreReadAndNoted) {
+  for (const char* mark :
+       {"-nan", "NAN(ind)", "-nan(ind)", "1.#QNAN", "-1.#IND", "NA", "N/A", "n/a", "null", "NULL",
+        "None", "#N/A", "<NA>", "NaT", "--", "?", "\"NA\"", " NA "}) {
+    const LogTable table = parse_csv(std::string("a_1,b_1\n1,2\n3,") + mark + "\n", "a.csv");
+    EXPECT_TRUE(std::isnan(table.columns[1].values[1])) << mark;
+    ASSERT_EQ(table.notes.size(), 1U) << mark;
+    EXPECT_NE(table.notes[0].find("cells that are read as not measured"), std::string::npos);
+  }
+  EXPECT_TRUE(parse_csv("a_1\nnan\n\"\"\n1\n", "a.csv").notes.empty());
+  for (const char* other : {"inf", "-inf", "1.#INF", "bad", "nanometre"})
+    EXPECT_THROW((void)parse_csv(std::string("a_1\n1\n") + other + "\n", "a.csv"), Error) << other;
+}
+
+TEST(Csv, FurtherMarksOfMissingValuesAreTextsOrNumbers) {
+  const CsvOptions options{.rules = {.missing = {"bad", "-999"}}};
+  const LogTable table = parse_csv("a_1,b_1\n1,bad\n-999.0,2\n3,-999\n", "a.csv", options);
+  EXPECT_TRUE(std::isnan(table.columns[1].values[0]));
+  EXPECT_TRUE(std::isnan(table.columns[0].values[1]));
+  EXPECT_TRUE(std::isnan(table.columns[1].values[2]));
+  EXPECT_EQ(table.columns[0].values[2], 3.0);
+}
+
+TEST(Csv, ADecimalCommaMayFollowExponentsAndTimes) {
+  const LogTable table =
+      parse_csv("t;a_1;b_1\n12:00:00,250;1e-05;0,5\n12:00:00,500;2;1,5\n", "a.csv");
+  EXPECT_EQ(table.columns[0].values, (std::vector<double>{43200.25, 43200.5}));
+  EXPECT_EQ(table.columns[2].values, (std::vector<double>{0.5, 1.5}));
+  EXPECT_THROW((void)parse_csv("a_1;b_1\n1.0;2\n2,0;3\n", "a.csv"), Error);
+}
+
+struct WrittenTime {
+  std::string text;
+  double time_s;
+};
+
+TEST(Csv, TimesAreReadWhereTheyHaveOneMeaning) {
+  constexpr double kDay_s = 19783.0 * 86400.0;  // 2024-03-01
+  for (const WrittenTime& time : {WrittenTime{"2024-03-01T12:34:56.5Z", kDay_s + 45296.5},
+                                  {"2024-03-01 12:34:56,5", kDay_s + 45296.5},
+                                  {"2024-03-01T12:34:56.5+01:00", kDay_s + 41696.5},
+                                  {"2024-03-01T12:34:56-0130", kDay_s + 50696.0},
+                                  {"2024-03-01T12:34", kDay_s + 45240.0},
+                                  {"2024/03/01 12:34:56 UTC", kDay_s + 45296.0},
+                                  {"01.03.2024 12:34:56", kDay_s + 45296.0},
+                                  {"20240301T123456Z", kDay_s + 45296.0},
+                                  {"12:34:56.5", 45296.5},
+                                  {"12:34:56:500", 45296.5},
+                                  {"1:02:03 PM", 46923.0},
+                                  {"12:00:01 AM", 1.0},
+                                  {"34:56.5", 2096.5},
+                                  {"2 days 00:00:01.5", 172801.5},
+                                  {"2024-03-01", kDay_s}}) {
+    const LogTable table = parse_csv("time;a_1\n" + time.text + ";1\n", "a.csv");
+    EXPECT_NE(table.columns[0].time, TimeKind::none) << time.text;
+    EXPECT_NEAR(table.columns[0].values[0], time.time_s, 1e-6) << time.text;
+  }
+  for (const char* text :
+       {"3/1/2024 12:34:56", "12:34", "2024-13-01", "2024-02-30T00:00:00", "2024-03-01T25:00:00",
+        "12:61:00", "1.5.2", "13:00:00 PM", "12:34:56:25"})
+    EXPECT_THROW((void)parse_csv(std::string("time,a_1\n") + text + ",1\n", "a.csv"), Error)
+        << text;
+  EXPECT_THROW((void)parse_csv("time,a_1\n12:34:56,1\n5,1\n", "a.csv"), Error);
+}
+
+TEST(Csv, TheFormatOfTimesMayBeGiven) {
+  const CsvOptions options{.rules = {.time_format = "%d/%m/%Y %I:%M:%S %p"}};
+  const LogTable table = parse_csv("time,a_1\n1/3/2024 01:00:00.25 PM,1\n", "a.csv", options);
+  EXPECT_NEAR(table.columns[0].values[0], 19783.0 * 86400.0 + 46800.25, 1e-6);
+}
+
+TEST(TimeStamp, TheFormatThatErrorsNameReadsTheText) {
+  for (const char* text :
+       {"3/1/2024 12:34:56.25", "03/01/24 01:02:03 PM", "01.03.24 12:34:56,5", "01-Mar-2024 12:34",
+        "Fri Mar 01 12:34:56 2024", "3/1/2024", "March 1 2024 12:34:56"}) {
+    EXPECT_TRUE(is_like_time(text)) << text;
+    const std::string format = likely_time_format(text);
+    EXPECT_TRUE(read_time_stamp(text, format)) << text << " by " << format;
+  }
+  for (const char* text : {"abc", "1,5", "marker 100", "1e999", "v1.2", "-inf"})
+    EXPECT_FALSE(is_like_time(text)) << text;
+}
+
+TEST(Csv, DateAndTimeInTwoColumnsAreOneTime) {
+  const LogTable table =
+      parse_csv("Date,Time,a_1\n2024-02-29,23:59:59.5,1\n2024-03-01,00:00:00.5,2\n", "a.csv");
+  ASSERT_EQ(table.columns.size(), 2U);
+  EXPECT_EQ(table.columns[0].name, "Time");
+  EXPECT_NEAR(table.columns[0].values[1] - table.columns[0].values[0], 1.0, 1e-6);
+  EXPECT_NEAR(table.columns[0].values[1], 19783.0 * 86400.0 + 0.5, 1e-6);
+}
+
+TEST(Csv, TimesOfTheDayPassMidnight) {
+  EXPECT_EQ(parse_csv("t,a_1\n23:59:59,1\n00:00:00,2\n00:00:01,3\n", "a.csv").columns[0].values,
+            (std::vector<double>{86399.0, 86400.0, 86401.0}));
+}
+
+class CsvPreamble : public testing::TestWithParam<std::string> {};
+
+TEST_P(CsvPreamble, IsSkippedAndNoted) {
+  const LogTable table = parse_csv(GetParam() + "t_s,torque_Nm\n0,1.5\n0.5,-2\n", "a.csv");
+  expect_two_rows(table);
+  EXPECT_EQ(table.notes.size(), 1U);
+  EXPECT_EQ(table.line_of(0), table.header_line + 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, CsvPreamble,
+                         testing::Values("Logger v1.2\n", "Logger\nDate: 2024-03-01\n\n",
+                                         "Operator,John\nRate,100\n", "a;b;c\n# note\nx,y,z,1\n",
+                                         "File,run7\n"));
+
+TEST(Csv, ThePreambleOfATableWithTextsIsSkippedToo) {
+  const LogTable table = parse_csv("Export\nby x, y, z\nt_s,state,a_1\n0,up,1\n1,down,2\n", "a.csv",
+                                   {.skip = {"state"}});
+  EXPECT_EQ(table.header_line, 3U);
+  EXPECT_EQ(table.columns[1].values, (std::vector<double>{1.0, 2.0}));
+}
+
+TEST(Csv, TheLinesAboveTheHeaderMayBeCounted) {
+  const CsvOptions options{.rules = {.skip_lines = 2}};
+  EXPECT_EQ(parse_csv("a_1,b_1\n1,2\nc_1,d_1\n3,4\n", "a.csv", options).columns[0].name, "c_1");
+}
+
+TEST(Csv, ACommentAboveNumbersIsTheHeader) {
+  expect_two_rows(parse_csv("# made by hand\n# t_s, torque_Nm\n0,1.5\n0.5,-2\n", "a.csv"));
+}
+
+TEST(Csv, ARowOfUnitsIsRead) {
+  const LogTable table =
+      parse_csv("t_s;Winkel;tau;n;x\n[s];\xc2\xb0;N\xc2\xb7m;-;counts\n0;1,5;2;3;4\n", "a.csv");
+  EXPECT_EQ(table.columns[0].unit, "s");
+  EXPECT_EQ(table.columns[1].unit, "deg");
+  EXPECT_EQ(table.columns[2].unit, "Nm");
+  EXPECT_EQ(table.columns[3].unit, "1");
+  EXPECT_EQ(table.columns[4].unit, "");
+  EXPECT_EQ(table.line_of(0), 3U);
+}
+
+TEST(Csv, UnitsInBracketsAreReadButNoIndices) {
+  const LogTable table = parse_csv(
+      "Time [ms],Motor torque (N\xc2\xb7m),w [deg/s],q[0],x(1),y [foo],n [-],a_rad [1]\n"
+      "0,1,2,3,4,5,6,7\n",
+      "a.csv");
+  const auto name = [&](std::size_t column) { return table.columns[column].full_name(); };
+  EXPECT_EQ(name(0), "Time_ms");
+  EXPECT_EQ(name(1), "Motor_torque_Nm");
+  EXPECT_EQ(name(2), "w_deg_s");
+  for (const std::size_t column : {3U, 4U, 5U, 7U}) EXPECT_FALSE(table.columns[column].has_unit());
+  EXPECT_EQ(name(6), "n_1");
+  EXPECT_EQ(table.notes,
+            std::vector<std::string>{
+                "units in brackets in the header are read, such as that of 'Time [ms]'"});
+}
+
+TEST(Csv, EmptyCellsAfterTheLastColumnAreNotRead) {
+  const LogTable table = parse_csv("Logger\nt_s;torque_Nm\n0;1,5;\n0,5;-2; ;\n", "a.csv");
+  expect_two_rows(table);
+  EXPECT_EQ(table.notes.back(), "empty cells after the last column are not read");
+}
+
+TEST(Csv, ColumnsWithoutANameAreNotRead) {
+  for (const char* header : {",t_s,torque_Nm", "Unnamed: 0,t_s,torque_Nm", "\"\",t_s,torque_Nm"}) {
+    const LogTable table = parse_csv(std::string(header) + "\n7,0,1.5\n8,0.5,-2\n", "a.csv");
+    expect_two_rows(table);
+    EXPECT_EQ(table.notes, std::vector<std::string>{"columns without a name are not read: 1"});
+  }
+  expect_two_rows(parse_csv("t_s,torque_Nm,,\n0,1.5,,\n0.5,-2,,\n", "a.csv"));
+}
+
+TEST(Csv, ColumnsThatTheMappingDoesNotNameAreReadIfTheyHaveAUnit) {
+  const CsvOptions options{.wanted = {"tau"}, .rules = {.only_wanted = true}};
+  const LogTable table =
+      parse_csv("t_s,tau,x,x,q_rad,stamp\n0,1,up,2,3,2024-03-01T00:00:00\n", "a.csv", options);
+  std::vector<std::string> names;
+  for (const LogColumn& column : table.columns) names.push_back(column.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"t_s", "tau", "q_rad", "stamp"}));
+  EXPECT_EQ(table.other_columns, (std::vector<std::string>{"x", "x"}));
+  ASSERT_FALSE(table.notes.empty());
+  EXPECT_NE(table.notes[0].find("not read: x, x"), std::string::npos) << table.notes[0];
+}
+
 TEST(Csv, ASkippedColumnMayHoldAnything) {
   const LogTable table =
       parse_csv("a_1,phase,b_1\n1,\"up, then down\",2\n3,down,4\n", "a.csv", {.skip = {"phase"}});
   ASSERT_EQ(table.columns.size(), 2U);
   EXPECT_EQ(table.columns[1].values, (std::vector<double>{2.0, 4.0}));
   EXPECT_EQ(table.columns[1].number, 3U);
+  EXPECT_EQ(parse_csv("a_1,adc0_x,adc1_x\n1,2,3\n", "a.csv", {.skip = {"adc*_x"}}).columns.size(),
+            1U);
 }
 
 TEST(Csv, LineNumbersCountCommentsAndBlankLines) {

@@ -12,8 +12,10 @@
 #include "data/arrays/child_process.hpp"
 #include "data/arrays/mat.hpp"
 #include "data/arrays/npz.hpp"
+#include "data/arrays/zip_archive.hpp"
 #include "data/bag/bag_records.hpp"
 #include "data/log_summary.hpp"
+#include "data/packed_by_zstd.hpp"
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "support/error_message.hpp"
@@ -29,6 +31,7 @@ namespace {
 
 using test::error_message;
 using test::file_bytes;
+using test::packed_by_zstd;
 using testing::HasSubstr;
 
 constexpr std::size_t kSamples = 200;
@@ -121,6 +124,28 @@ TEST(Db3, RefusesOtherDatabasesAndDamagedOnes) {
               HasSubstr("no tables 'topics' and 'messages'"));
 }
 
+TEST(Db3, PackedFilesAreReadAlsoWithALogOfChanges) {
+  const TemporaryFolder folder;
+  std::string whole = file_bytes(log_path("iron.db3"));
+  whole[18] = whole[19] = 2;  // journal_mode=WAL, as rosbag2 writes
+  std::ofstream(folder.path("run_0.db3.zstd"), std::ios::binary) << packed_by_zstd(whole);
+  expect_sine(read_log(folder.path("run_0.db3.zstd")).find("/joint_states/elbow/position")->values,
+              1.0, 1e-12);
+  // The folder, whose metadata have the name before or after it was packed.
+  for (const char* name : {"run_0.db3", "run_0.db3.zstd"}) {
+    std::ofstream(folder.path("metadata.yaml"))
+        << "rosbag2_bagfile_information:\n  compression_format: zstd\n  compression_mode: FILE\n"
+           "  relative_file_paths:\n    - "
+        << name << "\n";
+    EXPECT_EQ(read_log(folder.path("")).rows(), kSamples);
+  }
+  const std::string packed = file_bytes(folder.path("run_0.db3.zstd"));
+  std::ofstream(folder.path("cut.db3.zstd"), std::ios::binary)
+      << packed.substr(0, packed.size() / 2);
+  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("cut.db3.zstd")); }),
+              HasSubstr("truncated"));
+}
+
 class ArrayFile : public testing::TestWithParam<std::string> {};
 
 TEST_P(ArrayFile, HasItsRealNumbersAsColumns) {
@@ -139,7 +164,7 @@ TEST_P(ArrayFile, HasItsRealNumbersAsColumns) {
     return error_message(
         [&] { (void)read_log(log_path(GetParam()), {.skip = {}, .wanted = {name}}); });
   };
-  EXPECT_THAT(refused("z"), HasSubstr("numbers of type '<c16' are not read"));
+  EXPECT_THAT(refused("z"), HasSubstr("the array is not read: complex numbers, '<c16'"));
   EXPECT_THAT(refused("qq"),
               testing::AllOf(HasSubstr("there is no array 'qq'"), HasSubstr("q (200)")));
 }
@@ -148,6 +173,72 @@ INSTANTIATE_TEST_SUITE_P(Files, ArrayFile, testing::Values("arrays.npz", "packed
                          [](const auto& file) {
                            return file.param.substr(0, file.param.find('.'));
                          });
+
+TEST(Npz, HasTimesHalfPrecisionAndBigEndianNumbers) {
+  const Recording recording = load_recordings(log_path("types.npz")).front();
+  EXPECT_EQ(recording.sample_rate_Hz(), 200.0);
+  EXPECT_NEAR(recording.time_s(0), 1744909208.0, 1e-6);
+  expect_sine(recording.channel("q_rad").values, 1.0, 1e-15);
+  expect_sine(recording.channel("torque_Nm").values, 20.0, 1e-5);
+  expect_sine(recording.channel("half_Nm").values, 20.0, 1e-2);
+  EXPECT_EQ(recording.channel("count_1").values[150], 150.0);
+  EXPECT_THAT(recording.notes, testing::ElementsAre("the times in 'time' are the clock"));
+  EXPECT_THAT(recording.not_read,
+              testing::ElementsAre("z (complex numbers, '<c16')", "note (texts)",
+                                   HasSubstr("wide (2 x 200; "), "cube (more than two dimensions)",
+                                   "robot (objects of Python)", HasSubstr("log (structured")));
+  // A channel that is missing may be one that was not read.
+  EXPECT_THAT(error_message([&] { (void)recording.channel("tau_Nm"); }),
+              HasSubstr("; not read: z (complex numbers"));
+}
+
+TEST(Npz, OfThreeDimensionsTheLongerOneIsTheTime) {
+  const LogTable table = read_log(
+      log_path("types.npz"),
+      {.skip = {}, .wanted = {"deep/0", "deep/1", "deep_f/0", "deep_f/1", "rows/0", "rows/1"}});
+  for (const char* name : {"deep", "deep_f", "rows"}) {
+    expect_sine(table.find(std::string(name) + "/0")->values, 1.0, 1e-15);
+    expect_sine(table.find(std::string(name) + "/1")->values, 20.0, 1e-12);
+  }
+}
+
+TEST(Npz, HalfPrecisionHasItsWholeRange) {
+  const TemporaryFolder folder;
+  const auto values_of = [&](const std::string& type, const std::string& bytes) {
+    const std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': (" +
+                               std::to_string(bytes.size() / 2) + ",), }";
+    OutputFile file(folder.path("x.npz"));
+    ZipWriter archive(file);
+    archive.add("x.npy", std::string("\x93NUMPY\1\0", 8) + static_cast<char>(header.size()) + '\0' +
+                             header + bytes);
+    archive.finish();
+    file.commit();
+    return read_log(folder.path("x.npz")).columns.front().values;
+  };
+  // 1, -2, 65504, 2^-14, 2^-24, not a number
+  const std::string bytes("\x00\x3c\x00\xc0\xff\x7b\x00\x04\x01\x00\x01\x7e", 12);
+  EXPECT_THAT(values_of("<f2", bytes),
+              testing::ElementsAre(1.0, -2.0, 65504.0, std::ldexp(1.0, -14), std::ldexp(1.0, -24),
+                                   testing::IsNan()));
+  EXPECT_THAT(values_of(">u2", bytes), testing::Contains(0x003c));
+  EXPECT_THAT(error_message([&] { (void)values_of("<f16", bytes); }),
+              HasSubstr("x (numbers of type '<f16')"));
+}
+
+TEST(Npz, OtherArchivesAreNamedWithTheCommandThatReadsThem) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::string& member) {
+    OutputFile file(folder.path("x.zip"));
+    ZipWriter archive(file);
+    archive.add(member, "text");
+    archive.finish();
+    file.commit();
+    return error_message([&] { (void)read_log(folder.path("x.zip")); });
+  };
+  EXPECT_THAT(refused("run.csv"), HasSubstr("unzip "));
+  EXPECT_THAT(refused("xl/workbook.xml"),
+              testing::AllOf(HasSubstr("an Excel file"), HasSubstr("pandas.read_excel")));
+}
 
 TEST(Npz, AnyChangedByteIsAnErrorOrAnotherNumber) {
   const std::string whole = file_bytes(log_path("packed.npz"));
@@ -194,6 +285,29 @@ INSTANTIATE_TEST_SUITE_P(Versions, MatFiles,
                          [](const auto& file) {
                            return file.param.file.substr(0, file.param.file.find('.'));
                          });
+
+TEST(Mat, OfThreeDimensionsTheLongerOneIsTheTime) {
+  const LogTable table =
+      read_log(log_path("dimensions.mat"),
+               {.skip = {}, .wanted = {"deep.data/0", "deep.data/1", "deep.one/0"}});
+  expect_sine(table.find("deep.data/0")->values, 1.0, 1e-15);
+  expect_sine(table.find("deep.data/1")->values, 20.0, 1e-12);
+  expect_sine(table.find("deep.one/0")->values, 20.0, 1e-12);  // its only column
+}
+
+TEST(Mat, ListsWhatItDoesNotReadWithTheReason) {
+  const auto refused = [&](const std::vector<std::string>& wanted) {
+    return error_message(
+        [&] { (void)read_log(log_path("dimensions.mat"), {.skip = {}, .wanted = wanted}); });
+  };
+  EXPECT_THAT(
+      read_log(log_path("dimensions.mat")).not_read,
+      testing::ElementsAre("z (complex numbers)", "names (a cell array)", "note (a text)",
+                           "cube (more than two dimensions)", HasSubstr("wide (2 x 200; ")));
+  EXPECT_THAT(refused({"z"}), HasSubstr("the array is not read: z (complex numbers)"));
+  EXPECT_THAT(refused({"zz"}),
+              testing::AllOf(HasSubstr("there is no array 'zz'"), HasSubstr("not read: ")));
+}
 
 TEST(Mat, DamagedFilesAreErrorsAndNoCrash) {
   const TemporaryFolder folder;

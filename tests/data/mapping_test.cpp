@@ -110,9 +110,11 @@ channels:
   gear_angle_rad: {from: "#motor", unit: deg, scale: 1/150}
   torque_Nm: "true"
 drop: [note, "~"]
+missing: ["-999", bad]
+skip_lines: 3
 split_by: run
 keep: [8]
-clock: {rebuild: true, max_stray_steps: 3}
+clock: {rebuild: true, max_stray_steps: 3, format: "%H:%M:%S"}
 rate: 2kHz
 zero:
   - {channel: joint_angle_rad, first: 0.1s}
@@ -136,6 +138,9 @@ computed_from: {torque_Nm: [iq_A]}
     EXPECT_EQ(again.channels[i].offset, mapping.channels[i].offset);
   }
   EXPECT_EQ(again.drop, mapping.drop);
+  EXPECT_EQ(again.missing, mapping.missing);
+  EXPECT_EQ(again.skip_lines, 3U);
+  EXPECT_EQ(again.clock.format, "%H:%M:%S");
   EXPECT_EQ(again.split_by, "run");
   EXPECT_EQ(again.keep, std::vector<double>{}) << "which records of one log were used";
   EXPECT_TRUE(again.clock.rebuild);
@@ -184,11 +189,115 @@ TEST(Mapping, ResamplingSpreadsSamplesThatShareAStamp) {
 
 TEST(Mapping, HoldsASlowSensorAndMarksItsSamples) {
   const Channel torque =
-      read("t_s,torque_Nm\n0,\n1,5\n2,\n3,\n4,7\n", "hold: [torque_Nm]")[0].channel("torque_Nm");
-  EXPECT_TRUE(std::isnan(torque.values[0]));
-  EXPECT_EQ(std::vector<double>(torque.values.begin() + 1, torque.values.end()),
-            (std::vector<double>{5, 5, 5, 7}));
-  EXPECT_EQ(torque.fresh, (std::vector<std::uint8_t>{0, 1, 0, 0, 1}));
+      read("t_s,torque_Nm\n1,5\n2,\n3,\n4,7\n", "hold: [torque_Nm]")[0].channel("torque_Nm");
+  EXPECT_EQ(torque.values, (std::vector<double>{5, 5, 5, 7}));
+  EXPECT_EQ(torque.fresh, (std::vector<std::uint8_t>{1, 0, 0, 1}));
+}
+
+TEST(Mapping, HoldingBeginsWhereEveryHeldChannelHasAValue) {
+  const Recording recording = read("t_s,q_rad,torque_Nm,x_1\n0,1,,0\n1,,,1\n2,,5,2\n3,2,,3\n",
+                                   "hold: [q_rad, torque_Nm]")[0];
+  EXPECT_EQ(recording.time_s(0), 2.0);
+  EXPECT_EQ(recording.channel("q_rad").values, (std::vector<double>{1, 2}));
+  EXPECT_EQ(recording.channel("q_rad").fresh, (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(recording.channel("torque_Nm").values, (std::vector<double>{5, 5}));
+  EXPECT_EQ(recording.channel("x_1").values, (std::vector<double>{2, 3}));
+  EXPECT_EQ(recording.notes.size(), 1U);
+  const auto runs = read("t_s,run,torque_Nm\n0,1,4\n1,1,\n2,2,\n3,2,5\n4,2,6\n",
+                         "{split_by: run, hold: [torque_Nm]}");
+  EXPECT_EQ(runs[0].size(), 2U);
+  EXPECT_EQ(runs[1].channel("torque_Nm").values, (std::vector<double>{5, 6}));
+  const std::string message =
+      test::error_message([&] { (void)read("t_s,torque_Nm\n0,\n1,\n", "hold: [torque_Nm]"); });
+  EXPECT_NE(message.find("nothing was measured in log"), std::string::npos) << message;
+}
+
+TEST(Mapping, OfChannelsLeavesOutColumnsWithoutAUnitThatItDoesNotName) {
+  const Recording recording =
+      read("t_s,tau,state,adc0,q_rad\n0,1,2,3,4\n1,2,3,4,5\n", "channels: {torque_Nm: tau}")[0];
+  ASSERT_EQ(recording.channels().size(), 2U);
+  EXPECT_EQ(recording.channel("q_rad").values[1], 5.0);  // has a unit
+  EXPECT_EQ(recording.notes,
+            std::vector<std::string>{"columns without a unit that the mapping does not name are "
+                                     "not read: state, adc0"});
+}
+
+TEST(Mapping, WithoutChannelsColumnsWithoutAUnitAreAnErrorThatNamesAll) {
+  std::string header = "t_s";
+  for (int i = 0; i < 12; ++i) header += ",adc" + std::to_string(i);
+  const std::string row = ",5,5,5,5,5,5,5,5,5,5,5,5\n";
+  const std::string log = header + ",torque_Nm\n0,5" + row + "1,5" + row;
+  const std::string message = test::error_message([&] { (void)read(log); });
+  EXPECT_NE(message.find("12 columns have no unit"), std::string::npos) << message;
+  const std::string advice = "drop: [\"adc*\"]";
+  ASSERT_NE(message.find(advice), std::string::npos) << message;
+  EXPECT_EQ(read(log, advice)[0].channels().size(), 1U);
+}
+
+TEST(Mapping, AColumnToDropMayBeMissing) {
+  const std::string log = "t_s,i_1,torque_Nm\n0,1,2\n1,2,3\n";
+  EXPECT_EQ(read(log, "drop: [note, '', 'x*']")[0].notes.size(), 0U);
+  EXPECT_EQ(
+      read(log, "drop: [torqe_Nm]")[0].notes,
+      std::vector<std::string>{"there is no column 'torqe_Nm' to drop. Did you mean 'torque_Nm'?"});
+  LogTable table = parse_csv(log, "log.csv");  // columns of other formats are dropped, too
+  EXPECT_FALSE(measured_recordings(table, parse_mapping("drop: [i_1]", "m"))[0].has("i_1"));
+}
+
+TEST(Mapping, ADateIsTheClockOfALogWithoutAnotherOne) {
+  const std::string rows = "2024-03-01T00:00:00.0Z,1\n2024-03-01T00:00:00.5Z,2\n";
+  const Recording recording = read("stamp,torque_Nm\n" + rows)[0];
+  EXPECT_EQ(recording.sample_rate_Hz(), 2.0);
+  EXPECT_EQ(recording.notes, std::vector<std::string>{"the times in 'stamp' are the clock"});
+  for (const char* mapping :
+       {"channels: {torque_Nm: tau}", "channels: {torque_Nm: tau, t_s: stamp}",
+        "channels: {t_s: {from: stamp, unit: ms}, torque_Nm: tau}"})
+    EXPECT_EQ(read("stamp,tau\n" + rows, mapping)[0].sample_rate_Hz(), 2.0) << mapping;
+  EXPECT_EQ(read("time_s,torque_Nm\n" + rows)[0].sample_rate_Hz(), 2.0);
+  const Recording by_rate = read("stamp,torque_Nm\n" + rows, "rate: 100Hz")[0];
+  EXPECT_EQ(by_rate.sample_rate_Hz(), 100.0);
+  EXPECT_EQ(by_rate.notes,
+            std::vector<std::string>{"the times in 'stamp' are not read: the mapping has a rate"});
+  EXPECT_EQ(read("stamp,t_s,torque_Nm\n2024-03-01,0,1\n2024-03-01,1,2\n")[0].sample_rate_Hz(), 1.0);
+}
+
+TEST(Mapping, ARowOfUnitsIsAsGoodAsUnitsInTheNames) {
+  const std::string log = "Zeit;Winkel;Moment\ns;\xc2\xb0;mNm\n0,0;90;1500\n0,5;180;2500\n";
+  const Recording recording = read(log)[0];
+  EXPECT_EQ(recording.sample_rate_Hz(), 2.0);
+  EXPECT_DOUBLE_EQ(recording.channel("Winkel_rad").values[0], 90.0 * kDeg);
+  EXPECT_DOUBLE_EQ(recording.channel("Moment_Nm").values[1], 2.5);
+  EXPECT_DOUBLE_EQ(read(log, "channels: {torque_Nm: Moment}")[0].channel("torque_Nm").values[0],
+                   1.5);
+  const std::string conflict = "t_s,a_1\nms,-\n0,1\n500,2\n";
+  const std::string message = test::error_message([&] { (void)read(conflict); });
+  const std::string advice = "channels: {t_s: {from: t_s, unit: ms}}";
+  ASSERT_NE(message.find(advice), std::string::npos) << message;
+  EXPECT_EQ(read(conflict, advice)[0].sample_rate_Hz(), 2.0);
+}
+
+TEST(Mapping, UnitsInBracketsAreAsGoodAsUnitsInTheNames) {
+  const std::string log = "Time [ms],Motor torque [mNm]\n0,1500\n500,2500\n";
+  const Recording recording = read(log)[0];
+  EXPECT_EQ(recording.sample_rate_Hz(), 2.0);
+  EXPECT_DOUBLE_EQ(recording.channel("Motor_torque_Nm").values[1], 2.5);
+  const std::string rule = "channels: {torque_Nm: \"Motor torque [mNm]\"}";
+  EXPECT_DOUBLE_EQ(read(log, rule)[0].channel("torque_Nm").values[0], 1.5);
+  const std::string conflict = "t_s,a [mNm]\ns,Nm\n0,1\n1,2\n";
+  EXPECT_NE(test::error_message([&] { (void)read(conflict); }).find("ends in mNm, but the row"),
+            std::string::npos);
+}
+
+TEST(Mapping, OfALogWithoutAClockTheLikelyOneIsNamed) {
+  const auto refused = [&](const std::string& log) {
+    return test::error_message([&] { (void)read(log); });
+  };
+  EXPECT_NE(refused("sent,got,torque_Nm\n2024-03-01T00:00:00,2024-03-01T00:00:01,1\n")
+                .find("channels: {t_s: sent}"),
+            std::string::npos);
+  EXPECT_NE(refused("time_start_s,torque_Nm\n0,1\n")
+                .find("channels: {t_s: {from: time_start_s, unit: UNIT}}"),
+            std::string::npos);
 }
 
 TEST(Mapping, AFreshnessColumnFollowsItsChannelThroughARenaming) {

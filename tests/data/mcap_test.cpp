@@ -11,6 +11,7 @@
 
 #include "data/mcap/mcap_records.hpp"
 #include "data/mcap_bytes.hpp"
+#include "data/packed_by_zstd.hpp"
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "data/ros/ros_schema.hpp"
@@ -28,6 +29,7 @@ using test::error_message;
 using test::file_bytes;
 using test::file_with;
 using test::message;
+using test::packed_by_zstd;
 using testing::HasSubstr;
 
 // Written by the reference implementation of MCAP: tools/recording_peers/make_mcap.mjs has the equations.
@@ -144,6 +146,95 @@ TEST(Mcap, RowsBeforeTheFirstMessageOfAnotherTopicHaveNoValueOfIt) {
   EXPECT_THAT(table.find("/b/y")->fresh, testing::ElementsAre(1, 0, 1));
 }
 
+/// A message with a header, in CDR.
+std::string stamped(std::int32_t seconds, std::uint32_t nanoseconds, double x) {
+  return std::string("\0\1\0\0", 4) + test::number(seconds) + test::number(nanoseconds) +
+         test::number(std::uint32_t{1}) + std::string(4, '\0') + test::number(x);
+}
+
+constexpr const char* kStamped =
+    "std_msgs/Header header\nfloat64 x\n===\nMSG: std_msgs/Header\n"
+    "builtin_interfaces/Time stamp\nstring frame_id\n===\nMSG: builtin_interfaces/Time\n"
+    "int32 sec\nuint32 nanosec\n";
+
+std::vector<double> times_of(const std::string& file) { return parsed(file).find("t_s")->values; }
+
+TEST(Mcap, SimulatedTimeMayBeginAtZero) {
+  constexpr std::int64_t kWall_ns = 1'744'909'205'000'000'000;
+  std::string file = file_with("ros2msg", kStamped, "cdr", stamped(0, 0, 0.0));
+  // The first message of the helper was recorded at 1000 ns.
+  for (std::uint32_t n = 1; n < 4; ++n)
+    file += message(1, kWall_ns + 7'000'000 * n, stamped(0, 10'000'000 * n, n));
+  EXPECT_THAT(times_of(file), testing::ElementsAre(0.0, testing::DoubleNear(0.01, 1e-12),
+                                                   testing::DoubleNear(0.02, 1e-12),
+                                                   testing::DoubleNear(0.03, 1e-12)));
+  // The recorder has the simulated time, too; the first message of the helper is recorded at 1000 ns.
+  std::string all_simulated = file_with("ros2msg", kStamped, "cdr", stamped(0, 0, 0.0));
+  all_simulated += message(1, 10'003'000, stamped(0, 10'000'000, 1.0));
+  EXPECT_THAT(times_of(all_simulated), testing::ElementsAre(0.0, testing::DoubleNear(0.01, 1e-12)));
+}
+
+TEST(Mcap, WithoutStampsTheTimesOfTheRecorderAreUsed) {
+  std::string all_zero = file_with("ros2msg", kStamped, "cdr", stamped(0, 0, 0.0));
+  all_zero += message(1, 10'001'000, stamped(0, 0, 1.0));
+  EXPECT_THAT(times_of(all_zero), testing::ElementsAre(0.0, testing::DoubleNear(0.01, 1e-12)));
+  // A single message without a stamp, where the others have the clock of the recorder.
+  std::string one_zero = file_with("ros2msg", kStamped, "cdr", stamped(0, 1000, 0.0));
+  one_zero += message(1, 10'001'000, stamped(0, 0, 1.0));
+  one_zero += message(1, 20'001'000, stamped(0, 20'001'000, 2.0));
+  EXPECT_THAT(times_of(one_zero), testing::ElementsAre(0.0, testing::DoubleNear(0.01, 1e-12),
+                                                       testing::DoubleNear(0.02, 1e-12)));
+}
+
+/// Arm and gripper publish on one topic.
+std::string two_publishers(int arm_messages) {
+  std::string file = std::string(kMcapMark) + channel(1, 0, "/js", "json");
+  for (int n = 0; n < arm_messages; ++n) {
+    file += message(1, 10'000'000 * n, "{\"arm\": " + std::to_string(n) + ", \"spare\": null}");
+    if (n % 2 == 0)
+      file += message(1, 10'000'000 * n + 3'000'000, "{\"gripper\": " + std::to_string(n) + "}");
+  }
+  return file;
+}
+
+TEST(Mcap, TheClockOfATopicIsThatOfTheMessagesWithTheWantedFields) {
+  const std::string file = two_publishers(6);
+  const LogTable arm = parsed(file, {.wanted = {"/js/arm"}});
+  EXPECT_THAT(arm.find("/js/arm")->values, testing::ElementsAre(0, 1, 2, 3, 4, 5));
+  EXPECT_NEAR(arm.find("t_s")->values[1], 0.01, 1e-12);
+  EXPECT_EQ(arm.find("/js/gripper"), nullptr);
+  EXPECT_THAT(arm.column_list(), HasSubstr("/js/gripper"));  // for messages about wrong names
+  const LogTable gripper = parsed(file, {.wanted = {"/js/gripper"}});
+  EXPECT_THAT(gripper.find("/js/gripper")->values, testing::ElementsAre(0, 2, 4));
+  EXPECT_NEAR(gripper.find("t_s")->values[1], 0.02, 1e-12);
+}
+
+TEST(Mcap, FieldsOfTwoPublishersOnATopicAreHeldLikeThoseOfTwoTopics) {
+  const LogTable both = parsed(two_publishers(6), {.wanted = {"/js/arm", "/js/gripper"}});
+  EXPECT_THAT(both.find("/js/arm")->values, testing::ElementsAre(1, 2, 3, 4, 5));
+  EXPECT_THAT(both.find("/js/gripper")->values, testing::ElementsAre(0, 0, 2, 2, 4));
+  EXPECT_THAT(both.find("/js/gripper")->fresh, testing::ElementsAre(1, 0, 1, 0, 1));
+}
+
+TEST(Mcap, AFieldThatIsNullWasNotMeasured) {
+  const std::string file = std::string(kMcapMark) + channel(1, 0, "/a", "json") +
+                           message(1, 0, "{\"x\": 1}") + message(1, 10, "{\"x\": null}") +
+                           message(1, 20, "{\"x\": 3}");
+  EXPECT_THAT(parsed(file, {.wanted = {"/a/x"}}).find("/a/x")->values,
+              testing::ElementsAre(1.0, testing::IsNan(), 3.0));
+}
+
+TEST(Mcap, MessagesThatRosbag2PackedAreUnpacked) {
+  const std::string cdr = std::string("\0\1\0\0", 4) + test::number(1.5F);
+  const std::string packed = packed_by_zstd(cdr);
+  EXPECT_EQ(parsed(file_with("ros2msg", "float32 x", "cdr", packed)).find("/t/x")->values[0], 1.5);
+  EXPECT_THAT(
+      error_message([&] {
+        (void)parsed(file_with("ros2msg", "float32 x", "cdr", packed.substr(0, packed.size() - 2)));
+      }),
+      testing::AllOf(HasSubstr("message 1"), HasSubstr("zstd packed is damaged")));
+}
+
 TEST(Mcap, StatesWhatItDoesNotRead) {
   const std::string cdr("\0\1\0\0", 4);
   const auto refused = [](const std::string& bytes) {
@@ -212,7 +303,31 @@ TEST(ReadLog, ReadsTheFolderOfRosbag2InItsOrder) {
   const ReadLogOptions options{.skip = {}, .wanted = {"/joint_states/elbow/position"}};
   EXPECT_EQ(read_log(folder.path(""), options).rows(), 2 * kMessages);
   std::filesystem::remove(folder.path("metadata.yaml"));
-  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("")); }), HasSubstr("metadata.yaml"));
+  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("")); }),
+              testing::AllOf(HasSubstr("metadata.yaml"), HasSubstr("run_0.mcap, run_1.mcap"),
+                             HasSubstr("ros2 bag reindex")));
+  std::filesystem::remove(folder.path("run_1.mcap"));
+  EXPECT_EQ(read_log(folder.path(""), options).rows(), kMessages);
+}
+
+TEST(ReadLog, ReadsPackedFilesOfRosbag2) {
+  const TemporaryFolder folder;
+  const std::string whole = file_bytes(mcap_path("no_chunks.mcap"));
+  std::ofstream(folder.path("run_0.mcap.zstd"), std::ios::binary) << packed_by_zstd(whole);
+  const ReadLogOptions options{.skip = {}, .wanted = {"/joint_states/elbow/position"}};
+  EXPECT_EQ(read_log(folder.path("run_0.mcap.zstd"), options).rows(), kMessages);
+  const std::string metadata =
+      "rosbag2_bagfile_information:\n  compression_format: FORMAT\n  compression_mode: MESSAGE\n"
+      "  relative_file_paths: [run_0.mcap.zstd]\n";
+  const auto write = [&](const std::string& format) {
+    std::string text = metadata;
+    std::ofstream(folder.path("metadata.yaml")) << text.replace(text.find("FORMAT"), 6, format);
+  };
+  write("ZSTD");
+  EXPECT_EQ(read_log(folder.path(""), options).rows(), kMessages);
+  write("other");
+  EXPECT_THAT(error_message([&] { (void)read_log(folder.path(""), options); }),
+              testing::AllOf(HasSubstr("expected zstd"), HasSubstr("ros2 bag convert")));
 }
 
 TEST(ReadLog, NamesFormatsThatItDoesNotRead) {
@@ -220,6 +335,23 @@ TEST(ReadLog, NamesFormatsThatItDoesNotRead) {
   std::ofstream(folder.path("run.h5")) << "\x89HDF\r\n....";
   EXPECT_THAT(error_message([&] { (void)read_log(folder.path("run.h5")); }),
               testing::AllOf(HasSubstr("HDF5"), HasSubstr("numpy.savez")));
+  const auto refused = [&](const std::string& name, const std::string& bytes) {
+    std::ofstream(folder.path(name), std::ios::binary) << bytes;
+    return error_message([&] { (void)read_log(folder.path(name)); });
+  };
+  EXPECT_THAT(refused("run.parquet", "PAR1...."), HasSubstr("pandas.read_parquet("));
+  EXPECT_THAT(refused("run.csv.bz2", "BZh91AY&SY"),
+              HasSubstr("bunzip2 -k " + folder.path("run.csv.bz2")));
+  EXPECT_THAT(refused("run.csv.xz", std::string("\xfd"
+                                                "7zXZ\0..",
+                                                8)),
+              HasSubstr("unxz -k "));
+  EXPECT_THAT(refused("run.jsonl", "{\"t\": 0}\n{\"t\": 1}\n"),
+              testing::AllOf(HasSubstr("JSON, an object in each line"),
+                             HasSubstr("read_json(sys.argv[1], lines=True)")));
+  EXPECT_THAT(refused("run.json", " [ {\"t\": 0}]"),
+              testing::AllOf(HasSubstr("found JSON\n"), HasSubstr("read_json(sys.argv[1])")));
+  EXPECT_THAT(refused("a run.json", "[{}]"), HasSubstr("run.json'"));  // quoted for the shell
   std::ofstream(folder.path("run.csv")) << "t_s,torque_Nm\n0,1\n";
   EXPECT_EQ(read_log(folder.path("run.csv")).rows(), 1U);
   EXPECT_THAT(error_message([&] { (void)list_log(folder.path("run.csv")); }),

@@ -9,7 +9,9 @@
 
 #include "data/arrays/mat.hpp"
 #include "data/csv/csv_table.hpp"
+#include "data/db3/db3_messages.hpp"
 #include "data/mcap_bytes.hpp"
+#include "data/packed_by_zstd.hpp"
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "support/error_message.hpp"
@@ -23,6 +25,7 @@ namespace {
 
 using test::error_message;
 using test::file_with;
+using test::packed_by_zstd;
 using testing::HasSubstr;
 
 std::string refusal(const std::string& bytes) {
@@ -84,6 +87,26 @@ TEST(ReadBudget, EndsAPackedTableOfFewBytes) {
               HasSubstr("of memory"));
 }
 
+// Many zeros in a small frame.
+TEST(ReadBudget, EndsPackedMessagesAndFilesOfFewBytes) {
+  std::string large = std::string("\0\1\0\0", 4) + std::string(std::size_t{300} << 20, '\0');
+  EXPECT_THAT(refusal(file_with("ros2msg", "float64 x", "cdr", packed_by_zstd(large))),
+              HasSubstr("that zstd packed is damaged"));
+  large.replace(0, kDb3Mark.size(), kDb3Mark);
+  const TemporaryFolder folder;
+  std::ofstream(folder.path("run.db3.zstd"), std::ios::binary) << packed_by_zstd(large);
+  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("run.db3.zstd")); }),
+              HasSubstr("of memory"));
+}
+
+// Each message has a field of its own.
+TEST(ReadBudget, EndsMessagesThatAllDiffer) {
+  std::string file = std::string(kMcapMark) + test::channel(1, 0, "/a", "json");
+  for (int row = 0; row < 30000; ++row)
+    file += test::message(1, row, "{\"k" + std::to_string(row) + "\":1}");
+  EXPECT_THAT(refusal(file), HasSubstr("of memory"));
+}
+
 TEST(ReadBudget, AZeroAfterTheRecordsIsAnError) {
   EXPECT_THAT(refusal(file_with("jsonschema", "", "json", "{\"x\":1}") + std::string(900, '\0')),
               HasSubstr("a record without a kind"));
@@ -96,7 +119,7 @@ TEST(ReadBudget, PipesAndDevicesAreRefusedWhereAFileIsNeeded) {
 /// The values of all arrays of a file, or nothing if it is refused.
 std::vector<NamedArray> arrays_of(const std::string& path) {
   try {
-    return read_mat(path);
+    return read_mat(path).arrays;
   } catch (const Error&) {
     return {};
   }
@@ -106,7 +129,7 @@ std::vector<NamedArray> arrays_of(const std::string& path) {
 TEST(MatVerification, NoChangedByteOfAPackedFileGivesOtherNumbers) {
   const TemporaryFolder folder;
   const std::string whole = test::file_bytes(TORSIO_LOG_FILES "/octave_v7.mat");
-  const std::vector<NamedArray> right = read_mat(TORSIO_LOG_FILES "/octave_v7.mat");
+  const std::vector<NamedArray> right = read_mat(TORSIO_LOG_FILES "/octave_v7.mat").arrays;
   constexpr std::size_t kHeader = 128;
   std::size_t refused = 0;
   for (std::size_t at = kHeader; at < whole.size(); at += 61) {

@@ -37,6 +37,38 @@ TEST_F(ConvertVerb, RefusesWhatItCannotDo) {
   EXPECT_EQ(contents("c.csv"), before);
 }
 
+TEST_F(ConvertVerb, RemarksOnceOnWhatItAssumed) {
+  static_cast<void>(folder_.file("log.csv",
+                                 "Logger v2\n\n,date,time,q,tau,adc0,adc1\n,,,deg,Nm,V,-\n"
+                                 "0,2024-03-01,12:00:00.0,1,NA,5,x\n"
+                                 "1,2024-03-01,12:00:00.5,2,3,5,x\n"));
+  static_cast<void>(
+      folder_.file("map.yaml", "channels: {torque_Nm: tau}\ndrop: [adc*, torqe_Nm]\n"));
+  const Outcome call = torsio("convert log.csv --mapping map.yaml -o a.csv");
+  ASSERT_EQ(call.exit_code, 0) << call.err;
+  EXPECT_EQ(contents("a.csv").substr(0, 20), "t_s,torque_Nm,q_rad\n");
+  for (const char* remark :
+       {"line 3 is read as the header", "line 4 is read as a row of units",
+        "columns without a name are not read: 1", "'NA' (1)", "the dates in 'date' are added",
+        "the times in 'time' are the clock", "read as UTC"}) {
+    const std::size_t at = call.err.find(remark);
+    EXPECT_NE(at, std::string::npos) << remark << "\n" << call.err;
+    EXPECT_EQ(call.err.find(remark, at + 1), std::string::npos) << remark;
+  }
+}
+
+TEST_F(ConvertVerb, AModelsMappingMayDropAColumnThatALogDoesNotHave) {
+  ASSERT_EQ(torsio("simulate dfki-50 sweep --duration 20s -o a.csv").exit_code, 0);
+  ASSERT_EQ(shell("awk -F, -v OFS=, '{ print NR == 1 ? \"i_1\" : NR, $0 }' a.csv >b.csv; "
+                  "echo 'drop: [i_1]' >map.yaml")
+                .exit_code,
+            0);
+  const Outcome fit = torsio("fit b.csv --mapping map.yaml --model linear -o m.safetensors");
+  ASSERT_EQ(fit.exit_code, 0) << fit.err;
+  EXPECT_EQ(torsio("estimate m.safetensors a.csv -o e.csv").exit_code, 0);
+  EXPECT_EQ(torsio("evaluate m.safetensors a.csv").exit_code, 0);
+}
+
 TEST_F(ConvertVerb, OneBagMakesAModelForEachOfItsJoints) {
   ASSERT_EQ(torsio("simulate dfki-50 sweep --duration 20s -o a.csv").exit_code, 0);
   ASSERT_EQ(

@@ -137,11 +137,31 @@ def write_arrays(folder):
         file.write(head)
 
 
+def write_other_arrays(folder):
+    """Types and dimensions besides real numbers in one or two dimensions."""
+    n = numpy.arange(SAMPLES)
+    q = numpy.array([values(i)[0] for i in n])
+    tau = 20.0 * q
+    both = numpy.stack([q, tau])
+    start = numpy.datetime64("2025-04-17T17:00:08", "ns")
+    numpy.savez_compressed(
+        folder / "types.npz", time=start + (n * 5_000_000).astype("timedelta64[ns]"), q_rad=q.astype(">f8"),
+        torque_Nm=tau.astype(">f4"), half_Nm=tau.astype(numpy.float16), count_1=n.astype(">i2"),
+        deep=both[:, None, :], deep_f=numpy.asfortranarray(both[:, None, :]), rows=both[:, :, None].transpose(1, 0, 2),
+        z=q + 1j * q, note=numpy.array(["a"]), wide=both, cube=numpy.zeros((2, 3, 4)),
+        robot=numpy.array([{"name": "x"}], dtype=object), log=numpy.array([(0.0, 1.0)], dtype=[("t", "f8"), ("q", "f8")]))
+    scipy.io.savemat(folder / "dimensions.mat", {
+        "t_s": STEP_S * n, "deep": {"data": both[:, None, :], "one": tau[None, None, :]}, "z": q + 1j * q,
+        "names": numpy.array(["elbow", "wrist"], dtype=object), "note": "text", "cube": numpy.zeros((2, 3, 4)),
+        "wide": both}, do_compression=True)
+
+
 def main():
     folder = pathlib.Path(sys.argv[1])
     write_bags(folder)
     write_databases(folder)
     write_arrays(folder)
+    write_other_arrays(folder)
 
 
 main()

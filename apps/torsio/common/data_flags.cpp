@@ -179,7 +179,9 @@ torsio::Dataset DataFlags::checked(const Load& load) const {
     check_not_read(dataset.files);
     dataset.initialise_samples = initialise;
     remark_on_mapping(dataset);
-    for (const torsio::DatasetRecord& record : dataset.records) remark_on_end(record.recording);
+    std::vector<const torsio::Recording*> all;
+    for (const torsio::DatasetRecord& record : dataset.records) all.push_back(&record.recording);
+    remark_on_reading(all);
     return dataset;
   } catch (const torsio::Error& error) {
     torsio::ErrorReport report = error.report();
@@ -191,9 +193,27 @@ torsio::Dataset DataFlags::checked(const Load& load) const {
   }
 }
 
-void DataFlags::remark_on_end(const torsio::Recording& recording) {
-  if (recording.is_unfinished)
-    remark("warning: " + recording.name() + ": " + std::string(torsio::kUnfinishedText));
+void DataFlags::remark_on_reading(std::span<const torsio::Recording* const> recordings) {
+  std::map<std::string, std::vector<std::string>>
+      files_of_note;  // each note once, for all its files
+  for (const torsio::Recording* const recording : recordings) {
+    if (recording->is_unfinished)
+      remark("warning: " + recording->name() + ": " + std::string(torsio::kUnfinishedText));
+    std::vector<std::string> notes = recording->notes;
+    if (!recording->not_read.empty())
+      notes.push_back(
+          fmt::format("arrays that are not read: {}", fmt::join(recording->not_read, ", ")));
+    for (const std::string& note : notes) {
+      std::vector<std::string>& files = files_of_note[note];
+      if (std::ranges::find(files, recording->source.file) == files.end())
+        files.push_back(recording->source.file);
+    }
+  }
+  for (const auto& [note, files] : files_of_note) {
+    const std::string more =
+        files.size() > 1 ? fmt::format(" and {} other files", files.size() - 1) : std::string();
+    remark(fmt::format("{}{}: {}", files.front(), more, note));
+  }
 }
 
 torsio::Dataset DataFlags::read(const std::vector<std::string>& files,

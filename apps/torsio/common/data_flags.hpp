@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -55,8 +56,8 @@ struct DataFlags {
   void check_outputs(const std::vector<std::string>& outputs,
                      const std::vector<std::string>& more_inputs = {});
 
-  /// Prints a warning of a truncated file.
-  static void remark_on_end(const torsio::Recording& recording);
+  /// Prints warnings of truncated files, and what reading assumed.
+  static void remark_on_reading(std::span<const torsio::Recording* const> recordings);
 
  private:
   void add_rate_and_joint(CLI::App& verb);

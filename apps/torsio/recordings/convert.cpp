@@ -29,7 +29,8 @@ torsio::Recording read(const ConvertFlags& flags, const torsio::Progress& progre
   if (is_recorder_file(flags.input)) return torsio::read_recording_blocks(flags.input).recording;
   std::vector<torsio::Recording> recordings =
       torsio::load_recordings(flags.input, flags.data.load_options(progress));
-  DataFlags::remark_on_end(recordings.front());
+  const std::vector<const torsio::Recording*> first{&recordings.front()};
+  DataFlags::remark_on_reading(first);
   if (recordings.size() == 1) return std::move(recordings.front());
   throw torsio::Error({.place = flags.input,
                        .expected = "one recording",

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <string>
 #include <string_view>
@@ -31,6 +32,7 @@ struct ClockRule {
   /// Interpolate from uneven stamps onto this rate; samples that share a stamp are first spread
   /// evenly up to the next one. 0: no.
   double resample_Hz = 0.0;
+  std::string format = {};  ///< how a CSV file writes dates, for strptime; empty: ISO 8601
 };
 
 /// A channel and the latency of its sensor.
@@ -44,9 +46,11 @@ struct Mapping {
   std::string file;  ///< for messages; empty: no mapping
   std::vector<ChannelRule> channels;
   std::vector<ChannelDefinition> derive;
-  std::vector<std::string> drop;
-  std::string split_by;      ///< column; each run of equal values becomes a record
-  std::vector<double> keep;  ///< values of `split_by` that are kept; empty: all
+  std::vector<std::string> drop;     ///< columns; '*' is any text
+  std::vector<std::string> missing;  ///< cells of a CSV file where nothing was measured
+  std::size_t skip_lines = 0;        ///< lines of a CSV file above its header; 0: found by itself
+  std::string split_by;              ///< column; each run of equal values becomes a record
+  std::vector<double> keep;          ///< values of `split_by` that are kept; empty: all
   ClockRule clock;
   double rate_Hz = 0.0;  ///< sample rate of a log without clock; 0: not given
   std::vector<ZeroRule> zero;

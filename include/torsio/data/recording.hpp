@@ -64,6 +64,9 @@ class Recording {
   std::vector<ChannelDefinition> definitions;
   std::vector<ZeroRule> zeros;  ///< already applied to the values
   std::string mapping;  ///< `mapping_text` of the mapping that it was read with; empty: none
+  std::vector<std::string> notes;  ///< what reading the file assumed, in sentences
+  std::vector<std::string>
+      not_read;  ///< arrays of the file that are not read: "z (complex numbers)"
   /// Its recorder was stopped before it closed the file, or the file is truncated.
   bool is_unfinished = false;
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -87,14 +88,18 @@ class Collector {
     if (depth > kDeepest || !is_wanted(name, wanted_)) return;
     if (is_opaque(variable)) {
       opaque_.push_back(name);
+      not_read_.push_back(name + " (an object of MATLAB)");
     } else if (variable.class_type == MAT_C_STRUCT) {
       add_struct(variable, name, depth);
-    } else if (variable.rank == 2 && variable.data != nullptr && variable.isComplex == 0) {
+    } else if (const std::string problem = problem_of(variable); !problem.empty()) {
+      not_read_.push_back(fmt::format("{} ({})", name, problem));
+    } else if (variable.data != nullptr) {
       add_numbers(variable, name);
     }
   }
 
   [[nodiscard]] const std::vector<NamedArray>& arrays() const noexcept { return arrays_; }
+  [[nodiscard]] const std::vector<std::string>& not_read() const noexcept { return not_read_; }
   [[nodiscard]] std::string problem() const {
     if (values_ > kMaxArrayValues) return fmt::format("more than {} numbers", kMaxArrayValues);
     if (!opaque_.empty() && (!wanted_.empty() || arrays_.empty()))
@@ -125,17 +130,32 @@ class Collector {
     }
   }
 
+  [[nodiscard]] static std::optional<MatrixShape> shape_of(const matvar_t& variable) {
+    return as_matrix({variable.dims, static_cast<std::size_t>(variable.rank)});
+  }
+
+  /// @returns why it is not read; empty if it is
+  [[nodiscard]] static std::string problem_of(const matvar_t& variable) {
+    if (variable.class_type == MAT_C_CELL) return "a cell array";
+    if (variable.class_type == MAT_C_CHAR) return "a text";
+    if (variable.class_type == MAT_C_SPARSE) return "a sparse matrix";
+    if (variable.isComplex != 0) return "complex numbers";
+    return problem_of_shape({variable.dims, static_cast<std::size_t>(variable.rank)});
+  }
+
   template <class Number>
   void add_as(const matvar_t& variable, const std::string& name) {
-    const std::size_t rows = variable.dims[0];
-    const std::size_t columns = variable.dims[1];
+    const MatrixShape shape = *shape_of(variable);
+    const std::size_t rows = shape.rows;
+    const std::size_t columns = shape.columns;
     if (rows == 0 || columns == 0 || variable.nbytes / sizeof(Number) / rows < columns) return;
     values_ += rows * columns;
     if (values_ > kMaxArrayValues) return;
     const auto* const values = static_cast<const char*>(variable.data);
     add_columns(arrays_, name, rows, columns, [&](std::size_t row, std::size_t column) {
+      const std::size_t index = shape.is_turned ? row * columns + column : column * rows + row;
       Number value{};
-      std::memcpy(&value, values + (column * rows + row) * sizeof(Number), sizeof(Number));
+      std::memcpy(&value, values + index * sizeof(Number), sizeof(Number));
       return static_cast<double>(value);
     });
   }
@@ -160,6 +180,7 @@ class Collector {
   const std::vector<std::string>& wanted_;
   std::vector<NamedArray> arrays_;
   std::vector<std::string> opaque_;
+  std::vector<std::string> not_read_;
   std::size_t values_ = 0;
 };
 
@@ -171,6 +192,14 @@ bool send(int descriptor, const NamedArray& array) {
       .number(static_cast<std::uint64_t>(array.values.size()));
   return write_all(descriptor, head.data(), head.size()) &&
          write_all(descriptor, array.values.data(), array.values.size() * sizeof(double));
+}
+
+constexpr std::uint64_t kNotRead = ~std::uint64_t{0};  ///< in the place of the length
+
+bool send_not_read(int descriptor, const std::string& text) {
+  std::string head;
+  LittleEndianWriter(head).text<std::uint64_t>(text).number(kNotRead);
+  return write_all(descriptor, head.data(), head.size());
 }
 
 /// The work of the child. @returns what went wrong
@@ -202,6 +231,8 @@ std::string send_arrays(const std::string& path, const std::vector<std::string>&
     if (std::string problem = collector.problem(); !problem.empty()) return problem;
     for (const NamedArray& array : collector.arrays())
       if (!send(descriptor, array)) return "the result was not taken";
+    for (const std::string& text : collector.not_read())
+      if (!send_not_read(descriptor, text)) return "the result was not taken";
     return {};
   } catch (const std::exception& failed) {
     return std::string("it needs too much memory, or is damaged: ") + failed.what();
@@ -210,8 +241,8 @@ std::string send_arrays(const std::string& path, const std::vector<std::string>&
 
 }  // namespace
 
-std::vector<NamedArray> read_mat(const std::string& path, const std::vector<std::string>& wanted,
-                                 const Progress& progress) {
+ReadArrays read_mat(const std::string& path, const std::vector<std::string>& wanted,
+                    const Progress& progress) {
   ReadBudget budget(path, progress);
   const auto file = placed_bytes_of(path);
   verify_mat(*file, budget);
@@ -221,20 +252,24 @@ std::vector<NamedArray> read_mat(const std::string& path, const std::vector<std:
       output_of_child([&](int descriptor) { return send_arrays(path, wanted, descriptor); }, path,
                       progress, limits);
   LittleEndianReader reader(sent.bytes());
-  std::vector<NamedArray> arrays;
+  ReadArrays result;
   while (reader.left() > 0) {
     const auto name = reader.text<std::uint64_t>();
     const auto count = reader.number<std::uint64_t>();
+    if (name && count == kNotRead) {
+      result.not_read.emplace_back(*name);
+      continue;
+    }
     const auto bytes = name && count && *count <= reader.left() / sizeof(double)
                            ? reader.bytes(static_cast<std::size_t>(*count) * sizeof(double))
                            : std::nullopt;
     if (!bytes) throw Error({.place = path, .problem = "the library that reads it failed"});
-    NamedArray& array = arrays.emplace_back();
+    NamedArray& array = result.arrays.emplace_back();
     array.name = *name;
     array.values.resize(static_cast<std::size_t>(*count));
     std::memcpy(array.values.data(), bytes->data(), bytes->size());
   }
-  return arrays;
+  return result;
 }
 
 }  // namespace torsio

@@ -12,18 +12,18 @@
 
 namespace torsio {
 
-/// The arrays of numbers of numpy's `.npz`, packed or not: real and integer numbers and booleans of
-/// one or two dimensions, little-endian; single numbers are arrays of length 1. Source: numpy,
-/// format 1.0 to 3.0.
-/// @throws Error for objects (pickles), structured, complex, half-precision and big-endian arrays
-/// and for three dimensions, if one of `wanted` is such an array; without `wanted` those are left out.
-[[nodiscard]] std::vector<NamedArray> read_npz(const PlacedBytes& bytes, const std::string& name,
-                                               const std::vector<std::string>& wanted = {},
-                                               const Progress& progress = {});
+/// The arrays of numbers of numpy's `.npz`, packed or not: real and integer numbers, booleans and times (in
+/// seconds) of one or two dimensions, or of more if these are of length 1; single numbers are arrays of
+/// length 1. Source: numpy, format 1.0 to 3.0.
+/// @throws Error for an archive without arrays, and for objects (pickles), structured and complex arrays and
+/// texts if one of `wanted` is such an array; otherwise those are listed.
+[[nodiscard]] ReadArrays read_npz(const PlacedBytes& bytes, const std::string& name,
+                                  const std::vector<std::string>& wanted = {},
+                                  const Progress& progress = {});
 /// The same of a pipe or a packed file, which is read into memory first.
-[[nodiscard]] std::vector<NamedArray> read_npz(ByteSource& source, const std::string& name,
-                                               const std::vector<std::string>& wanted = {},
-                                               const Progress& progress = {});
+[[nodiscard]] ReadArrays read_npz(ByteSource& source, const std::string& name,
+                                  const std::vector<std::string>& wanted = {},
+                                  const Progress& progress = {});
 
 /// An array of float64 for `t_s`, each channel, and the freshness of those that have it.
 void write_npz(const Recording& recording, OutputFile& file, const Progress& progress = {});

@@ -1,14 +1,24 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <functional>
+#include <map>
+#include <optional>
 #include <string_view>
 
+#include "core/trimmed.hpp"
 #include "data/byte_source.hpp"
+#include "data/csv/csv_errors.hpp"
 #include "data/csv/csv_header.hpp"
+#include "data/csv/csv_start.hpp"
 #include "data/csv/csv_table.hpp"
 #include "data/csv/decimal.hpp"
 #include "data/csv/line_reader.hpp"
+#include "data/csv/missing_mark.hpp"
+#include "data/csv/time_stamp.hpp"
+#include "data/mapping/column_advice.hpp"
 #include "data/names.hpp"
 #include "data/read_budget.hpp"
 #include "torsio/core/error.hpp"
@@ -18,16 +28,45 @@
 namespace torsio {
 namespace {
 
+/// As pandas names a column that had no name.
+bool is_nameless(std::string_view name) {
+  constexpr std::string_view kUnnamed = "Unnamed: ";
+  if (!name.starts_with(kUnnamed)) return name.empty();
+  name.remove_prefix(kUnnamed.size());
+  return !name.empty() &&
+         std::ranges::all_of(name, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+bool is_among(const std::vector<std::string>& names, std::string_view name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
 /// Turns lines into rows of a table.
 class TableParser {
  public:
-  TableParser(LogTable& table, const CsvHeader& header, const CsvOptions& options,
-              ReadBudget& budget)
-      : table_(table), separator_(header.separator), limits_(options.limits), budget_(budget) {
-    for (std::size_t i = 0; i < header.names.size(); ++i)
-      columns_.push_back({.name = header.names[i], .number = i + 1, .values = {}});
-    for (const LogColumn& column : columns_)
-      read_.push_back(std::ranges::find(options.skip, column.name) == options.skip.end() ? 1 : 0);
+  TableParser(LogTable& table, const CsvStart& start, const CsvOptions& options, ReadBudget& budget)
+      : table_(table),
+        separator_(start.header.separator),
+        options_(options),
+        budget_(budget),
+        state_(start.header.names.size()) {
+    for (std::size_t i = 0; i < state_.size(); ++i) {
+      columns_.push_back({.name = start.header.names[i], .number = i + 1, .values = {}});
+      const std::string unit_cell = i < start.units.size() ? start.units[i] : std::string();
+      const Unit* unit = unit_cell == "-" ? find_unit("1") : unit_in_words(unit_cell);
+      const auto in_brackets = unit_in_brackets(columns_.back().name);
+      if (unit == nullptr && in_brackets && !split_channel_name(columns_.back().name)) {
+        unit = in_brackets->unit;
+        if (column_in_brackets_.empty()) column_in_brackets_ = columns_.back().name;
+      }
+      if (unit != nullptr) columns_.back().unit = unit->suffix;
+    }
+    for (const std::string& mark : options.rules.missing) {
+      const char* at = mark.c_str();
+      double value = 0.0;
+      if (read_decimal(at, value) && *at == '\0') missing_numbers_.push_back(value);
+    }
+    choose_columns();
   }
 
   /// `line` must be followed by a '\n' in memory.
@@ -39,37 +78,109 @@ class TableParser {
         if (at == end) refuse_ragged(line, number);
         ++at;
       }
-      double value = kNotMeasured;
       const char* after = at;
-      if (read_[i] == 0) {
+      if (rows_ == 0 && state_[i].is_read_if_time) choose_by_cell(i, {at, cell_end(at, end)});
+      if (!state_[i].is_read) {
         at = cell_end(at, end);
         continue;
       }
+      double value = kNotMeasured;
       if (!read_decimal(after, value) || (after != end && *after != separator_)) {
         after = cell_end(at, end);
-        value = unusual_cell({at, after}, number, columns_[i]);
-      } else if (comma_seen_ && std::string_view(at, after).find('.') != std::string_view::npos) {
-        refuse_mixture(number, columns_[i]);
+        value = unusual_cell({at, after}, number, i);
+      } else {
+        if (may_have_commas() && std::string_view(at, after).find('.') != std::string_view::npos)
+          see_point(number, columns_[i]);
+        value = unless_missing(value, {at, after});
       }
       columns_[i].values.push_back(value);
       at = after;
     }
-    if (at != end) refuse_ragged(line, number);
+    if (at != end) skip_empty_cells({at, end}, line, number);
     mark(number);
     budget_.keep(columns_.size() * sizeof(double));
-    if (++rows_ * columns_.size() > limits_.values)
+    if (++rows_ * columns_.size() > options_.limits.values)
       throw Error({.place = fmt::format("{}: line {}", table_.source.file, number),
-                   .problem = fmt::format("more than {} numbers", limits_.values),
+                   .problem = fmt::format("more than {} numbers", options_.limits.values),
                    .advice = "Cut the log into several files."});
   }
 
   void finish() {
-    for (std::size_t i = 0; i < columns_.size(); ++i)
-      if (read_[i] != 0) table_.columns.push_back(std::move(columns_[i]));
+    finish_times();
+    std::vector<std::string> left_out;
+    std::vector<std::string> nameless;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      if (state_[i].is_read) {
+        table_.columns.push_back(std::move(columns_[i]));
+        continue;
+      }
+      if (is_nameless(columns_[i].name))
+        nameless.push_back(fmt::format("{}", i + 1));
+      else if (state_[i].is_left_out)
+        left_out.push_back(columns_[i].name);
+      if (!columns_[i].name.empty()) table_.other_columns.push_back(columns_[i].name);
+    }
+    if (!nameless.empty())
+      table_.notes.push_back("columns without a name are not read: " + joined(nameless));
+    if (!left_out.empty()) table_.notes.push_back(note_of_left_out(left_out));
+    std::vector<std::string> marks;
+    for (const auto& [mark, times] : missing_marks_)
+      marks.push_back(fmt::format("'{}' ({})", printable(mark), times));
+    if (!marks.empty())
+      table_.notes.push_back("cells that are read as not measured: " + joined(marks));
+    if (!column_in_brackets_.empty())
+      table_.notes.push_back(
+          fmt::format("units in brackets in the header are read, such as that of '{}'",
+                      printable(column_in_brackets_)));
+    if (has_empty_ends_)
+      table_.notes.emplace_back("empty cells after the last column are not read");
+    if (has_local_times_) table_.notes.emplace_back("time stamps without a zone are read as UTC");
   }
   [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
 
  private:
+  struct ColumnState {
+    bool is_read = true;
+    bool is_left_out = false;  ///< because the mapping does not name it
+    bool is_read_if_time = false;
+    std::size_t time_stamps = 0;
+  };
+
+  void choose_columns() {
+    std::map<std::string_view, std::size_t> seen;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      const LogColumn& column = columns_[i];
+      ColumnState& state = state_[i];
+      const bool is_wanted = is_among(options_.wanted, column.name);
+      if (is_matched_by_any(column.name, options_.skip) ||
+          (is_nameless(column.name) && !is_wanted)) {
+        state.is_read = false;
+      } else if (options_.rules.only_wanted && !is_wanted && !column.has_unit()) {
+        state = {.is_read = false, .is_left_out = true, .is_read_if_time = true};
+      }
+      if (!state.is_read) continue;
+      const auto [first, is_new] = seen.emplace(column.name, column.number);
+      if (!is_new)
+        throw Error(
+            {.place = place(table_.header_line, column),
+             .problem = fmt::format("duplicate column: column {} has the same name", first->second),
+             .advice = "Rename one of them in the file."});
+    }
+  }
+
+  void choose_by_cell(std::size_t column, std::string_view cell) {
+    state_[column].is_read_if_time = false;
+    if (!time_stamp(stripped(cell))) return;
+    state_[column].is_read = true;
+    state_[column].is_left_out = false;
+  }
+
+  [[nodiscard]] std::optional<TimeStamp> time_stamp(std::string_view cell) const {
+    if (!options_.rules.time_format.empty())
+      if (const auto stamp = read_time_stamp(cell, options_.rules.time_format)) return stamp;
+    return read_time_stamp(cell);
+  }
+
   [[nodiscard]] const char* cell_end(const char* at, const char* end) const {
     bool quoted = false;
     for (; at != end && (quoted || *at != separator_); ++at)
@@ -77,44 +188,114 @@ class TableParser {
     return at;
   }
 
-  /// Everything but a plain number: blanks, quotes, an empty cell, nan, a decimal comma.
-  double unusual_cell(std::string_view cell, std::size_t line, const LogColumn& column) {
-    const std::string_view whole = cell;
-    const auto strip = [&cell](char c) {
-      while (!cell.empty() && cell.front() == c) cell.remove_prefix(1);
-      while (!cell.empty() && cell.back() == c) cell.remove_suffix(1);
-    };
-    strip(' ');
+  /// Without blanks and quotes around it.
+  [[nodiscard]] static std::string_view stripped(std::string_view cell) {
+    cell = trimmed(cell);
     if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"')
-      cell = cell.substr(1, cell.size() - 2);
-    strip(' ');
+      cell = trimmed(cell.substr(1, cell.size() - 2));
+    return cell;
+  }
+
+  /// Everything but a plain number: blanks, quotes, marks of what is missing, dates, a decimal comma.
+  double unusual_cell(std::string_view whole, std::size_t line, std::size_t index) {
+    const LogColumn& column = columns_[index];
+    const std::string_view cell = stripped(whole);
     if (cell.empty() || cell == "nan" || cell == "NaN" || cell == "NAN") return kNotMeasured;
+    if (is_missing_mark(cell) || is_among(options_.rules.missing, cell)) return missing(cell);
+    if (const auto stamp = time_stamp(cell)) return add_time(*stamp, line, index);
     std::string text(cell);
     if (const auto comma = text.find(','); comma != std::string::npos && separator_ != ',') {
-      if (text.find('.') != std::string::npos || (!comma_seen_ && point_was_seen()))
-        refuse_mixture(line, column);
+      if (point_seen_ || text.find('.') != std::string::npos) refuse_mixture(place(line, column));
       text[comma] = '.';
       comma_seen_ = true;
+    } else if (may_have_commas() && text.find('.') != std::string::npos) {
+      see_point(line, column);
     }
     const char* at = text.c_str();
     double value = kNotMeasured;
     if (!read_decimal(at, value) || at != text.c_str() + text.size())
-      throw Error({.place = place(line, column),
-                   .expected = "a number, nan or nothing",
-                   .found = "'" + printable(whole) + "'",
-                   .advice = "Correct the cell, or leave the column out with  drop: [" +
-                             column.name + "]  in a mapping."});
-    return value;
+      refuse_cell(cell, place(line, column), column.name);
+    return unless_missing(value, cell);
   }
 
-  /// Asked once, at the first decimal comma: a broken number so far was written with a point.
-  [[nodiscard]] bool point_was_seen() const {
-    const auto is_broken = [](double value) {
-      return std::isfinite(value) && std::trunc(value) != value;
-    };
-    return std::ranges::any_of(columns_, [&](const LogColumn& column) {
-      return std::ranges::any_of(column.values, is_broken);
-    });
+  double add_time(const TimeStamp& stamp, std::size_t line, std::size_t index) {
+    LogColumn& column = columns_[index];
+    if (column.time != TimeKind::none && column.time != stamp.kind)
+      throw Error(
+          {.place = place(line, column), .problem = "dates, times of day and both in one column"});
+    column.time = stamp.kind;
+    ++state_[index].time_stamps;
+    if (stamp.kind == TimeKind::date_time && !stamp.has_zone) has_local_times_ = true;
+    return stamp.time_s;
+  }
+
+  /// Checks the columns of dates and times, and adds a date to the time of day in another column.
+  void finish_times() {
+    std::vector<std::size_t> dates;
+    std::vector<std::size_t> times;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      const LogColumn& column = columns_[i];
+      if (column.time == TimeKind::none || !state_[i].is_read) continue;
+      const auto values =
+          std::ranges::count_if(column.values, [](double value) { return !std::isnan(value); });
+      if (static_cast<std::size_t>(values) != state_[i].time_stamps)
+        throw Error({.place = table_.header_place(column),
+                     .problem = "the column has numbers and time stamps",
+                     .advice = "Correct the cells, or leave the column out with  drop: [" +
+                               yaml_name(column.name) + "]  in a mapping."});
+      if (column.time == TimeKind::date) dates.push_back(i);
+      if (column.time == TimeKind::time_of_day) times.push_back(i);
+    }
+    if (dates.size() == 1 && times.size() == 1) {
+      LogColumn& time = columns_[times.front()];
+      const LogColumn& date = columns_[dates.front()];
+      for (std::size_t row = 0; row < time.values.size(); ++row)
+        time.values[row] += date.values[row];
+      time.time = TimeKind::date_time;
+      state_[dates.front()].is_read = false;
+      has_local_times_ = true;
+      table_.notes.push_back(fmt::format("the dates in '{}' are added to the times in '{}'",
+                                         printable(date.name), printable(time.name)));
+      return;
+    }
+    for (const std::size_t i : times) unwrap_midnight(columns_[i].values);
+  }
+
+  static void unwrap_midnight(std::vector<double>& times_s) {
+    constexpr double kDay_s = 86400.0;
+    double days_s = 0.0;
+    double before_s = kNotMeasured;
+    for (double& time_s : times_s) {
+      if (std::isnan(time_s)) continue;
+      if (time_s < before_s - kDay_s / 2.0) days_s += kDay_s;
+      before_s = time_s;
+      time_s += days_s;
+    }
+  }
+
+  double missing(std::string_view cell) {
+    constexpr std::size_t kMaxMarks = 20;
+    if (const auto known = missing_marks_.find(cell); known != missing_marks_.end())
+      ++known->second;
+    else if (missing_marks_.size() < kMaxMarks)
+      missing_marks_.emplace(cell, 1);
+    return kNotMeasured;
+  }
+
+  double unless_missing(double value, std::string_view cell) {
+    const bool is_missing = !missing_numbers_.empty() &&
+                            std::ranges::find(missing_numbers_, value) != missing_numbers_.end();
+    return is_missing ? missing(cell) : value;
+  }
+
+  /// Whether it is not known yet that numbers have decimal points.
+  [[nodiscard]] bool may_have_commas() const noexcept {
+    return separator_ != ',' && (comma_seen_ || !point_seen_);
+  }
+
+  void see_point(std::size_t line, const LogColumn& column) {
+    if (comma_seen_) refuse_mixture(place(line, column));
+    point_seen_ = true;
   }
 
   void mark(std::size_t line) {
@@ -128,10 +309,11 @@ class TableParser {
                        column.name);
   }
 
-  [[noreturn]] void refuse_mixture(std::size_t line, const LogColumn& column) const {
-    throw Error({.place = place(line, column),
-                 .problem = "decimal commas and decimal points in one file",
-                 .advice = "Export the log again with one of them and without thousands marks."});
+  /// Many programs write a separator after the last cell, but none in the header.
+  void skip_empty_cells(std::string_view rest, std::string_view line, std::size_t number) {
+    const auto is_empty = [&](char c) { return c == separator_ || c == ' '; };
+    if (!std::ranges::all_of(rest, is_empty)) refuse_ragged(line, number);
+    has_empty_ends_ = true;
   }
 
   [[noreturn]] void refuse_ragged(std::string_view line, std::size_t number) const {
@@ -139,75 +321,26 @@ class TableParser {
     const char* const end = line.data() + line.size();
     for (const char* at = cell_end(line.data(), end); at != end; at = cell_end(at + 1, end))
       ++found;
-    throw Error({.place = fmt::format("{}: line {}", table_.source.file, number),
-                 .expected = fmt::format("{} cells, as in the header (line {})", columns_.size(),
-                                         table_.header_line),
-                 .found = fmt::format("{}", found),
-                 .advice = "The line may have been cut off while logging: remove or correct it."});
+    refuse_cells(fmt::format("{}: line {}", table_.source.file, number), found,
+                 {.names = columns_.size(), .line = table_.header_line, .separator = separator_});
   }
 
   LogTable& table_;
   char separator_;
-  CsvLimits limits_;
+  const CsvOptions& options_;
   ReadBudget& budget_;
   std::vector<LogColumn> columns_;
-  std::vector<std::uint8_t> read_;
+  std::vector<ColumnState> state_;
+  std::string column_in_brackets_;  ///< the first whose unit is there
+  std::vector<double> missing_numbers_;
+  std::map<std::string, std::size_t, std::less<>> missing_marks_;
   std::size_t rows_ = 0;
   std::size_t last_line_ = 0;
   bool comma_seen_ = false;
+  bool point_seen_ = false;
+  bool has_local_times_ = false;
+  bool has_empty_ends_ = false;
 };
-
-std::string nearest_or(std::string nearest, const char* otherwise) {
-  return nearest.empty() ? otherwise : std::move(nearest);
-}
-
-void check_skipped(const CsvHeader& header, const CsvOptions& options, const std::string& place) {
-  for (const std::string& name : options.skip)
-    if (std::ranges::find(header.names, name) == header.names.end())
-      throw Error({.place = place,
-                   .problem = "there is no column '" + name + "' to drop",
-                   .found = "the columns " + joined(header.names),
-                   .advice = nearest_or(did_you_mean(name, header.names),
-                                        "Logs of several kinds take a manifest, which gives each "
-                                        "file its own mapping.")});
-}
-
-bool is_comment_or_blank(std::string_view line) { return line.empty() || line.front() == '#'; }
-
-/// The first line that is neither blank nor a comment.
-std::string_view header_line(LineReader& lines, const std::string& name, std::size_t limit) {
-  std::string_view line;
-  std::size_t bytes = 0;
-  while (lines.next(line, limit)) {
-    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-    if (lines.number() == 1 && line.starts_with(kByteOrderMark))
-      line.remove_prefix(kByteOrderMark.size());
-    if (!is_comment_or_blank(line)) return line;
-    bytes += line.size() + 1;
-    if (bytes > limit)
-      throw Error({.place = name,
-                   .problem = fmt::format("no header line within the first {} bytes", limit)});
-  }
-  throw Error({.place = name,
-               .problem = lines.number() == 0 ? "the file is empty" : "no header line",
-               .expected = "a header line and rows of numbers"});
-}
-
-/// A model file, whose first bytes are a number and may hold a line end.
-void refuse_model(std::string_view first, LineReader& lines, const std::string& name) {
-  constexpr std::string_view kMark = R"({"__metadata__")";
-  constexpr std::size_t kLengthBytes = 8;
-  constexpr std::size_t kLongestHeader = std::size_t{1} << 20;
-  const bool is_like_length = first.size() < kLengthBytes && !is_utf8(first);
-  std::string_view next = first;
-  if (is_like_length && !lines.next(next, kLongestHeader)) return;
-  if (next.substr(0, kLengthBytes + kMark.size()).find(kMark) == std::string_view::npos) return;
-  throw Error({.place = name,
-               .expected = "a recording",
-               .found = "a model file",
-               .advice = "torsio evaluate MODEL REC takes the model first; other verbs take "
-                         "recordings only."});
-}
 
 }  // namespace
 
@@ -215,33 +348,32 @@ LogTable read_csv(ByteSource& source, const std::string& name, const CsvOptions&
   LogTable table;
   table.source.file = name;
   LineReader lines(source, name);
-  const std::string first(header_line(lines, name, options.limits.header_bytes));
-  table.header_line = lines.number();
-  const std::string place = fmt::format("{}: line {}", name, table.header_line);
-  refuse_model(first, lines, name);
-  const CsvHeader header = parse_header(first, place);
-  check_skipped(header, options, place);
+  const CsvStart start = read_start(lines, name, options);
+  table.header_line = start.line;
+  table.notes = start.notes;
   ReadBudget budget(name);
-  TableParser parser(table, header, options, budget);
-  std::string_view line;
+  TableParser parser(table, start, options, budget);
   std::size_t gap_bytes = 0;
-  while (lines.next(line, options.limits.line_bytes)) {
+  const auto take = [&](std::string_view line, std::size_t number) {
     budget.read_to(source.bytes_read());
     constexpr std::size_t kTextPerElement = 16;  // comments of a packed file take time, too
     budget.work(1 + line.size() / kTextPerElement);
     if (!is_comment_or_blank(line)) {
-      parser.add(line, lines.number());
+      parser.add(line, number);
       gap_bytes = 0;
-      continue;
+      return;
     }
     gap_bytes += line.size() + 1;
     if (gap_bytes > options.limits.gap_bytes)
-      throw Error({.place = fmt::format("{}: line {}", name, lines.number()),
+      throw Error({.place = fmt::format("{}: line {}", name, number),
                    .expected = "a row of numbers",
                    .found = fmt::format("more than {} bytes of blank lines and comments",
                                         options.limits.gap_bytes),
                    .advice = "Remove them:  grep -Ev '^(#|$)' LOG.csv > SHORT.csv"});
-  }
+  };
+  for (const LineAhead& ahead : start.ahead) take(ahead.line(), ahead.number);
+  std::string_view line;
+  while (lines.next(line, options.limits.line_bytes)) take(line, lines.number());
   if (parser.rows() == 0)
     throw Error({.place = name,
                  .problem = "no samples",

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 
 #include "core/trimmed.hpp"
 #include "data/csv/decimal.hpp"
@@ -13,69 +12,6 @@
 
 namespace torsio {
 namespace {
-
-char detect_separator(std::string_view line) {
-  constexpr std::array<char, 3> kSeparators = {',', ';', '\t'};
-  std::array<std::size_t, 3> count{};
-  bool quoted = false;
-  for (const char c : line) {
-    if (c == '"') quoted = !quoted;
-    for (std::size_t i = 0; i < kSeparators.size(); ++i)
-      if (!quoted && c == kSeparators.at(i)) ++count.at(i);
-  }
-  return kSeparators.at(static_cast<std::size_t>(std::ranges::max_element(count) - count.begin()));
-}
-
-std::vector<std::string> split_names(std::string_view line, char separator,
-                                     const std::string& place) {
-  std::vector<std::string> names;
-  std::string name;
-  bool quoted = false;
-  const auto finish = [&] {
-    names.emplace_back(trimmed(name));
-    name.clear();
-  };
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    if (line[i] == '"') {
-      const bool escaped = quoted && i + 1 < line.size() && line[i + 1] == '"';
-      if (escaped) name += line[++i];
-      if (!escaped) quoted = !quoted;
-    } else if (line[i] == separator && !quoted) {
-      finish();
-    } else {
-      name += line[i];
-    }
-  }
-  finish();
-  if (quoted)
-    throw Error({.place = place,
-                 .problem = "a quotation mark is not closed",
-                 .found = "'" + printable(line) + "'"});
-  return names;
-}
-
-bool is_number(const std::string& text) {
-  const char* at = text.c_str();
-  double value = 0.0;
-  return read_decimal(at, value) && at == text.c_str() + text.size();
-}
-
-void refuse_binary(std::string_view line, const std::string& place) {
-  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; };
-  const auto* const at = std::ranges::find_if(line, is_control);
-  if (at == line.end()) return;
-  if (line.starts_with("TORSIOB1"))
-    throw Error({.place = place,
-                 .expected = "a header line of text",
-                 .found = "a recorder's sealed blocks",
-                 .advice = "Turn them into CSV first: torsio unpack run.tsr -o run.csv"});
-  const bool wide = line.starts_with("\xff\xfe") || line.starts_with("\xfe\xff");
-  throw Error({.place = place,
-               .expected = "a header line of text",
-               .found = wide ? "UTF-16" : "binary data: '" + printable(line) + "'",
-               .advice = wide ? "Save the file as UTF-8."
-                              : "torsio reads CSV, plain or gzipped; convert the file first."});
-}
 
 std::string escaped_line(std::string_view line) {
   std::string text;
@@ -98,34 +34,34 @@ void refuse_latin(std::string_view line, const std::string& place) {
 void refuse_blanks(const std::vector<std::string>& names, std::string_view line,
                    const std::string& place) {
   if (names.size() > 1 || trimmed(line).find_first_of(" |") == std::string_view::npos) return;
+  const bool has_bars = line.find('|') != std::string_view::npos;
   throw Error({.place = place,
                .problem = "no separator found",
                .expected = "names between commas, semicolons or tabs",
                .found = "'" + printable(line) + "'",
-               .advice = "Export the log again with one of them, or put commas in the place of the "
-                         "blanks:  sed 's/^ *//; s/  */,/g' LOG.txt > LOG.csv"});
+               .advice = has_bars
+                             ? "Export the log again with one of them, or replace the vertical "
+                               "lines:  tr '|' , < LOG.txt > LOG.csv"
+                             : "Export the log again with one of them, or put commas in the place "
+                               "of the blanks:  sed 's/^ *//; s/  */,/g' LOG.txt > LOG.csv"});
+}
+
+void refuse_open_quote(std::string_view line, const std::string& place) {
+  if (std::ranges::count(line, '"') % 2 == 0) return;
+  throw Error({.place = place,
+               .problem = "a quotation mark is not closed",
+               .found = "'" + printable(line) + "'"});
 }
 
 void check_names(const std::vector<std::string>& names, const std::string& place) {
-  if (std::ranges::all_of(names, is_number))
+  if (std::ranges::all_of(names, is_decimal))
     throw Error({.place = place,
                  .expected = "a header line with channel names",
                  .found = "numbers: '" + printable(joined(names)) + "'",
                  .advice = "Put a line such as  t_s,angle_deg,torque_Nm  first; a header that "
-                           "starts with '#' is taken for a comment."});
-  std::map<std::string_view, std::size_t> seen;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i].empty())
-      throw Error({.place = fmt::format("{}, column {}", place, i + 1),
-                   .problem = "the column has no name",
-                   .advice = "Name it, or remove a separator at the end of the lines."});
-    const auto [first, is_new] = seen.emplace(names[i], i + 1);
-    if (!is_new)
-      throw Error(
-          {.place = fmt::format("{}, column {} ({})", place, i + 1, printable(names[i])),
-           .problem = fmt::format("duplicate column: column {} has the same name", first->second),
-           .advice = "Rename one of them in the file."});
-  }
+                           "starts with '#' is read if it has as many names."});
+  if (std::ranges::all_of(names, [](const auto& name) { return name.empty(); }))
+    throw Error({.place = place, .expected = "names of columns", .found = "empty cells"});
 }
 
 }  // namespace
@@ -143,12 +79,67 @@ bool is_utf8(std::string_view text) noexcept {
   return true;
 }
 
+char detect_separator(std::string_view line) {
+  constexpr std::array<char, 3> kSeparators = {',', ';', '\t'};
+  std::array<std::size_t, 3> count{};
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"') quoted = !quoted;
+    for (std::size_t i = 0; i < kSeparators.size(); ++i)
+      if (!quoted && c == kSeparators.at(i)) ++count.at(i);
+  }
+  return kSeparators.at(static_cast<std::size_t>(std::ranges::max_element(count) - count.begin()));
+}
+
+std::vector<std::string> cells_of(std::string_view line, char separator) {
+  std::vector<std::string> cells;
+  std::string cell;
+  bool quoted = false;
+  const auto finish = [&] {
+    cells.emplace_back(trimmed(cell));
+    cell.clear();
+  };
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"') {
+      const bool escaped = quoted && i + 1 < line.size() && line[i + 1] == '"';
+      if (escaped) cell += line[++i];
+      if (!escaped) quoted = !quoted;
+    } else if (line[i] == separator && !quoted) {
+      finish();
+    } else {
+      cell += line[i];
+    }
+  }
+  finish();
+  return cells;
+}
+
+void refuse_binary(std::string_view line, const std::string& place) {
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; };
+  const auto* const at = std::ranges::find_if(line, is_control);
+  if (at == line.end()) return;
+  if (line.starts_with("TORSIOB1"))
+    throw Error({.place = place,
+                 .expected = "a header line of text",
+                 .found = "a recorder's sealed blocks",
+                 .advice = "Turn them into CSV first: torsio unpack run.tsr -o run.csv"});
+  const bool wide = line.starts_with("\xff\xfe") || line.starts_with("\xfe\xff");
+  throw Error(
+      {.place = place,
+       .expected = "a header line of text",
+       .found = wide ? "UTF-16" : "binary data: '" + printable(line) + "'",
+       .advice = wide ? "Save the file as UTF-8, or convert it:  iconv -f UTF-16 -t UTF-8 LOG.csv "
+                        "> LOG_utf8.csv"
+                      : "torsio reads CSV, plain or gzipped; convert the file first."});
+}
+
 CsvHeader parse_header(std::string_view line, const std::string& place) {
   refuse_binary(line, place);
   CsvHeader header;
   header.separator = detect_separator(line);
   refuse_latin(line, place);
-  header.names = split_names(line, header.separator, place);
+  refuse_open_quote(line, place);
+  header.names = cells_of(line, header.separator);
   refuse_blanks(header.names, line, place);
   check_names(header.names, place);
   return header;

@@ -19,16 +19,27 @@ struct CsvLimits {
   std::size_t values = std::size_t{256} << 20;    ///< cells of numbers: 2 GiB of memory
 };
 
+/// What a mapping specifies about a CSV file.
+struct CsvRules {
+  /// Whether columns without a unit are read only if they are wanted, or hold dates.
+  bool only_wanted = false;
+  std::vector<std::string> missing = {};  ///< further cells of what was not measured
+  std::size_t skip_lines = 0;             ///< lines before the header; 0: it is looked for
+  std::string time_format = {};           ///< how dates are written, for strptime; empty: ISO 8601
+};
+
 struct CsvOptions {
   std::vector<std::string> skip = {};  ///< columns that are not read and may hold anything
   CsvLimits limits = {};
   Progress progress =
       {};  ///< is called with each block that is read, also while waiting for a pipe
+  std::vector<std::string> wanted = {};  ///< columns that the mapping names
+  CsvRules rules = {};
 };
 
 /// Reads a CSV file, plain or gzipped (detected by its first bytes); "-" is standard input. The
 /// header gives the names; separator comma, semicolon or tab; lines that start with '#' are
-/// comments. See docs/use/recordings.md.
+/// comments. What was assumed is in the notes of the table. See docs/use/recordings.md.
 /// @throws Error with line and column if it is not a table of numbers, Cancelled if the
 /// progress asks to stop.
 [[nodiscard]] LogTable read_csv(const std::string& path, const CsvOptions& options = {});

@@ -52,10 +52,44 @@ Db3Messages::Db3Messages(const std::string& path, Progress progress)
   std::error_code unknown;
   const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
   if (!unknown) budget().read_to(bytes);
+  open(path.c_str());
+  prepare();
+}
+
+Db3Messages::Db3Messages(ByteSource& packed, const std::string& name, Progress progress)
+    : MessageSource(ReadBudget(name, std::move(progress))) {
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  std::string block;
+  bool is_whole = true;
+  while (is_whole) {
+    is_whole = read_exactly(packed, block, kBlock);
+    budget().read_to(packed.bytes_read());
+    budget().keep(block.size());
+    unpacked_ += block;
+  }
+  // The log of changes is another file, which a database in memory has not.
+  constexpr std::size_t kVersions = 18;
+  constexpr char kWithLog = 2;
+  for (std::size_t at = kVersions; at < kVersions + 2 && at < unpacked_.size(); ++at)
+    if (unpacked_[at] == kWithLog) unpacked_[at] = 1;
+  open(":memory:");
+  const auto size = static_cast<sqlite3_int64>(unpacked_.size());
+  if (sqlite3_deserialize(database_.get(), "main",
+                          reinterpret_cast<unsigned char*>(unpacked_.data()), size, size,
+                          SQLITE_DESERIALIZE_READONLY) != SQLITE_OK)
+    refuse("it cannot be opened");
+  prepare();
+}
+
+void Db3Messages::open(const char* path) {
   sqlite3* opened = nullptr;
-  const int code = sqlite3_open_v2(path.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr);
+  const int code = sqlite3_open_v2(path, &opened, SQLITE_OPEN_READONLY, nullptr);
   database_.reset(opened);
   if (code != SQLITE_OK) refuse("it cannot be opened");
+}
+
+void Db3Messages::prepare() {
+  sqlite3* const opened = database_.get();
   sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, kMaxBytes);
   // A file of unknown origin must not call functions.
   sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);

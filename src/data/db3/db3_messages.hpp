@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "data/byte_source.hpp"
 #include "data/ros/message_source.hpp"
 #include "torsio/core/progress.hpp"
 
@@ -25,6 +26,8 @@ class Db3Messages final : public MessageSource {
  public:
   /// @throws Error if the file is no such database. Cancelled if the progress asks to stop.
   Db3Messages(const std::string& path, Progress progress = {});
+  /// The same of a packed file, which is unpacked into memory.
+  Db3Messages(ByteSource& packed, const std::string& name, Progress progress = {});
   ~Db3Messages() override;
   Db3Messages(const Db3Messages&) = delete;
   Db3Messages& operator=(const Db3Messages&) = delete;
@@ -40,6 +43,8 @@ class Db3Messages final : public MessageSource {
   };
   using Statement = std::unique_ptr<sqlite3_stmt, Finalize>;
 
+  void open(const char* path);
+  void prepare();
   [[nodiscard]] Statement query(const char* sql);
   /// The next row. @returns false after the last
   bool step(const Statement& statement);
@@ -50,6 +55,7 @@ class Db3Messages final : public MessageSource {
   void read_topics();
   [[noreturn]] void refuse(const std::string& problem) const;
 
+  std::string unpacked_;        ///< must outlive the database
   std::exception_ptr stopped_;  ///< why the database was asked to stop
   std::unique_ptr<sqlite3, CloseDatabase> database_;
   std::map<std::int64_t, MessageChannel> topics_;

@@ -7,6 +7,8 @@
 #include <cctype>
 
 #include "core/trimmed.hpp"
+#include "data/names.hpp"
+#include "data/yaml_reader.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -81,19 +83,13 @@ std::string channel_like(std::string_view text) {
   return name.empty() ? "channel" : name;
 }
 
-std::string quoted(std::string_view text) {
-  const bool is_plain =
-      std::ranges::all_of(text, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
-  return is_plain ? std::string(text) : fmt::format("\"{}\"", text);
-}
-
 std::string mapping_line(std::string_view quantity, std::string_view unit, std::string_view column,
                          std::string_view rest) {
   const Unit* const known = find_unit(unit);
   const std::string_view si = known != nullptr ? known->si_suffix : unit;
   const bool is_clock = si == "s";
   return fmt::format("channels: {{{}_{}: {{from: {}, {}}}}}",
-                     is_clock ? "t" : channel_like(quantity), si, quoted(column), rest);
+                     is_clock ? "t" : channel_like(quantity), si, yaml_name(column), rest);
 }
 
 /// "Torque [Nm]", "Winkel (deg)": the name and the unit in brackets at its end.
@@ -104,10 +100,65 @@ std::pair<std::string_view, std::string_view> without_brackets(std::string_view 
   return {trimmed(name.substr(0, open)), name.substr(open + 1, name.size() - open - 2)};
 }
 
+/// Without brackets around it.
+std::string_view without_frame(std::string_view text) {
+  text = trimmed(text);
+  if (text.size() >= 2 &&
+      ((text.front() == '[' && text.back() == ']') || (text.front() == '(' && text.back() == ')')))
+    text = trimmed(text.substr(1, text.size() - 2));
+  return text;
+}
+
 }  // namespace
 
+std::string yaml_name(std::string_view text) {
+  const bool is_plain =
+      !text.empty() && std::isdigit(static_cast<unsigned char>(text.front())) == 0 &&
+      std::ranges::all_of(text, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
+  return is_plain ? std::string(text) : yaml_quoted(escaped(text));
+}
+
+const Unit* unit_in_words(std::string_view written) {
+  const std::string_view text = without_frame(written);
+  if (const Unit* const unit = find_written_unit(text)) return unit;
+  std::string plain;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    constexpr std::string_view kDegree = "\xc2\xb0";
+    constexpr std::string_view kDot = "\xc2\xb7";
+    constexpr std::string_view kMicro = "\xc2\xb5";
+    const std::string_view rest = text.substr(i);
+    const bool is_special =
+        rest.starts_with(kDegree) || rest.starts_with(kDot) || rest.starts_with(kMicro);
+    if (rest.starts_with(kDegree)) plain += "deg";
+    if (rest.starts_with(kMicro)) plain += 'u';
+    if (is_special)
+      ++i;
+    else if (text[i] == '%')
+      plain += "pct";
+    else if (text[i] != ' ' && text[i] != '*' && text[i] != '.')
+      plain += text[i];
+  }
+  if (const Unit* const unit = find_written_unit(plain)) return unit;
+  if (plain == "nm") return nullptr;  // nanometres, too
+  const auto* const at = std::ranges::find(kSpellings, lower(plain), &Word::word);
+  return at == kSpellings.end() ? nullptr : find_unit(at->meaning);
+}
+
+std::optional<NameInBrackets> unit_in_brackets(std::string_view name) {
+  const auto [quantity, written] = without_brackets(name);
+  if (written.empty() || std::isdigit(static_cast<unsigned char>(written.front())) != 0)
+    return std::nullopt;
+  const Unit* const unit = written == "-" ? find_unit("1") : unit_in_words(written);
+  if (unit == nullptr) return std::nullopt;
+  NameInBrackets split{.quantity = std::string(quantity), .unit = unit};
+  std::ranges::replace(split.quantity, ' ', '_');
+  return split;
+}
+
+bool is_like_clock(std::string_view column_name) { return unit_of_quantity(column_name) == "s"; }
+
 std::string advice_without_unit(std::string_view column) {
-  const std::string drop = fmt::format("  or leave it out:  drop: [{}]", quoted(column));
+  const std::string drop = fmt::format("  or leave it out:  drop: [{}]", yaml_name(column));
   auto [quantity, unit] = without_brackets(column);
   if (unit.empty()) {
     const auto ending = column.rfind('_');
@@ -126,7 +177,7 @@ std::string advice_without_unit(std::string_view column) {
     return fmt::format(
                "Rename the column to NAME_UNIT, or write in a mapping  channels: {{NAME_UNIT: "
                "{{from: {}, unit: UNIT}}}}",
-               quoted(column)) +
+               yaml_name(column)) +
            drop;
   if (unit.empty())
     return fmt::format("Rename the column, or specify its unit in a mapping; if it is {0}:  {1}",

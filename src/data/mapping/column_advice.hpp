@@ -1,7 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 
@@ -9,5 +12,24 @@ namespace torsio {
 /// with the quantity that its name speaks of. An unknown unit is asked for as `scale:`, never taken
 /// for a known one.
 [[nodiscard]] std::string advice_without_unit(std::string_view column_name);
+
+/// A text of a mapping, in quotes if it needs them.
+[[nodiscard]] std::string yaml_name(std::string_view text);
+
+/// A unit as people and loggers spell it: "[deg/s]", "seconds", "°", "N·m"; null if it is not known.
+[[nodiscard]] const Unit* unit_in_words(std::string_view written);
+
+/// A name that ends in a unit in brackets.
+struct NameInBrackets {
+  std::string quantity;  ///< with '_' in the place of blanks
+  const Unit* unit = nullptr;
+};
+
+/// "Motor torque [Nm]", "Winkel (°)"; nothing if what is in brackets is not a known unit, or a number, which may
+/// be an index.
+[[nodiscard]] std::optional<NameInBrackets> unit_in_brackets(std::string_view name);
+
+/// Whether the name of a column is like that of a clock: "stamp", "Time".
+[[nodiscard]] bool is_like_clock(std::string_view column_name);
 
 }  // namespace torsio

@@ -63,8 +63,12 @@ class UsedTable {
   std::set<const LogColumn*> read_again_;
 };
 
-const Unit* unit_of_source(const ChannelRule& rule, const Unit* unit_of_channel) {
+/// Texts of dates are in seconds, whatever the names.
+const Unit* unit_of_source(const ChannelRule& rule, const LogColumn& column,
+                           const Unit* unit_of_channel) {
+  if (column.time != TimeKind::none) return find_unit("s");
   if (!rule.unit.empty()) return find_unit(rule.unit);
+  if (!column.unit.empty()) return find_unit(column.unit);
   const auto from = split_channel_name(rule.from);
   return from ? from->unit : unit_of_channel;
 }
@@ -75,7 +79,7 @@ TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
   LogColumn& column = column_named(used.table(), rule.from, place);
   const auto name = split_channel_name(rule.name);
   if (!name) throw Error({.place = place, .problem = "the name has no unit"});
-  const Unit* unit = unit_of_source(rule, name->unit);
+  const Unit* unit = unit_of_source(rule, column, name->unit);
   if (unit == nullptr) throw Error({.place = place, .problem = "unknown unit '" + rule.unit + "'"});
   const double scale =
       rule.sign * rule.scale * gear_scale(name->unit->si_suffix, rule.gear_ratio).value_or(1.0);
@@ -92,22 +96,110 @@ TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
           .column = &column};
 }
 
+std::string common_start(const std::vector<std::string>& names) {
+  std::string start = names.front();
+  for (const std::string& name : names)
+    while (!name.starts_with(start)) start.pop_back();
+  return start;
+}
+
+/// The other columns without a unit, for the advice on the first.
+std::string advice_on_others(const LogTable& table, const LogColumn& column) {
+  std::vector<std::string> names;
+  std::vector<std::string> sound;
+  for (const LogColumn& other : table.columns)
+    (other.has_unit() || other.time != TimeKind::none ? sound : names).push_back(other.name);
+  if (names.size() < 2 || names.front() != column.name) return {};
+  std::string pattern = common_start(names) + "*";
+  std::vector<std::string> dropped;
+  dropped.reserve(names.size());
+  for (const std::string& name : names) dropped.push_back(yaml_name(name));
+  constexpr std::size_t kMaxListed = 8;
+  if (names.size() > kMaxListed && pattern.size() > 1 &&
+      std::ranges::none_of(sound, [&](const auto& name) { return is_matched(name, pattern); }))
+    dropped = {yaml_name(pattern)};
+  return fmt::format(
+      "\n  {} columns have no unit. A mapping with channels: reads of these only the ones that it "
+      "names; without channels:, leave them out:  drop: [{}]",
+      names.size(), joined(dropped));
+}
+
+/// @param in_name the unit in the full name, which is that in brackets only if there is no other
+void refuse_conflict(const LogTable& table, const LogColumn& column, const Unit& in_name) {
+  const auto in_brackets = unit_in_brackets(column.name);
+  const Unit& unit = in_brackets ? *in_brackets->unit : in_name;
+  if (column.unit.empty() || column.unit == unit.suffix) return;
+  throw Error({.place = table.header_place(column),
+               .problem = fmt::format("its name ends in {}, but the row of units has {}",
+                                      unit.suffix, column.unit),
+               .advice = fmt::format("Specify which is right in a mapping, for example  channels: "
+                                     "{{{}: {{from: {}, unit: {}}}}}",
+                                     column.full_name(), yaml_name(column.name), column.unit)});
+}
+
 TableChannel channel_from_column(LogColumn& column, const UsedTable& used) {
-  const auto name = split_channel_name(column.name);
+  const std::string full_name = column.full_name();
+  const auto name = split_channel_name(full_name);
   if (!name) {
     const auto ending = column.name.rfind('_');
     const bool has_ending = ending != std::string::npos && ending + 1 < column.name.size();
-    throw Error({.place = used.table().header_place(column),
-                 .problem = has_ending ? fmt::format("'{}' is not a known unit",
-                                                     column.name.substr(ending + 1))
-                                       : "the name has no unit",
-                 .expected = "a name that ends in one of " + known_unit_list(),
-                 .found = "'" + printable(column.name) + "'",
-                 .advice = advice_without_unit(column.name)});
+    throw Error(
+        {.place = used.table().header_place(column),
+         .problem = has_ending
+                        ? fmt::format("'{}' is not a known unit", column.name.substr(ending + 1))
+                        : "the name has no unit",
+         .expected = "a name that ends in one of " + known_unit_list(),
+         .found = "'" + printable(column.name) + "'",
+         .advice = advice_without_unit(column.name) + advice_on_others(used.table(), column)});
   }
+  refuse_conflict(used.table(), column, *name->unit);
+  const bool is_time = column.time != TimeKind::none;
   return {.channel = {.name = name->si(),
-                      .values = used.converted(column, name->unit->scale, name->unit->offset)},
+                      .values = used.converted(column, is_time ? 1.0 : name->unit->scale,
+                                               is_time ? 0.0 : name->unit->offset)},
           .column = &column};
+}
+
+/// Removes the columns that the mapping drops. One that is missing may be in other logs of the mapping; a
+/// name that resembles that of a column is noted.
+void drop_columns(LogTable& table, const Mapping& mapping) {
+  const std::vector<std::string> names = table.column_names();
+  for (const std::string& name : mapping.drop) {
+    if (name.empty() ||
+        std::ranges::any_of(names, [&](const auto& column) { return is_matched(column, name); }))
+      continue;
+    if (const std::string nearest = did_you_mean(name, names); !nearest.empty())
+      table.notes.push_back(
+          fmt::format("there is no column '{}' to drop. {}", printable(name), nearest));
+  }
+  std::erase_if(table.columns, [&](const LogColumn& column) {
+    if (!is_matched_by_any(column.name, mapping.drop)) return false;
+    table.other_columns.push_back(column.name);
+    return true;
+  });
+}
+
+/// The column of dates or times that is the clock of a log without another one.
+LogColumn* time_column(LogTable& table, const std::set<const LogColumn*>& consumed) {
+  const auto is_time = [&](const LogColumn& column) {
+    return column.time != TimeKind::none && column.time != TimeKind::date &&
+           !consumed.contains(&column) && !split_channel_name(column.name);
+  };
+  const auto at = std::ranges::find_if(table.columns, is_time);
+  const bool is_only = at != table.columns.end() &&
+                       std::find_if(at + 1, table.columns.end(), is_time) == table.columns.end();
+  return is_only ? &*at : nullptr;
+}
+
+/// The only channel in seconds whose unit is in brackets or in a row of units, whatever its name.
+TableChannel* channel_in_seconds(std::vector<TableChannel>& all) {
+  const auto is_time = [](const TableChannel& made) {
+    const std::string full_name = made.column->full_name();
+    const auto name = split_channel_name(full_name);
+    return full_name != made.column->name && name && name->unit->si_suffix == "s" &&
+           made.channel.name == name->si();
+  };
+  return std::ranges::count_if(all, is_time) == 1 ? &*std::ranges::find_if(all, is_time) : nullptr;
 }
 
 /// Freshness column -> the column whose samples it marks.
@@ -151,7 +243,8 @@ void refuse_duplicates(const std::vector<TableChannel>& channels, const LogTable
            .problem = fmt::format("duplicate column: in SI it is {}, and so is column {} "
                                   "({})",
                                   made.channel.name, first->second->number, first->second->name),
-           .advice = fmt::format("Leave one out in a mapping:  drop: [{}]", made.column->name)});
+           .advice = fmt::format("Leave one out in a mapping:  drop: [{}]",
+                                 yaml_name(made.column->name))});
   }
 }
 
@@ -170,8 +263,7 @@ std::optional<double> gear_scale(std::string_view si_unit, double gear_ratio) no
 LogColumn& column_named(LogTable& table, const std::string& name, const std::string& place) {
   const auto at = std::ranges::find(table.columns, name, &LogColumn::name);
   if (at != table.columns.end()) return *at;
-  std::vector<std::string> names;
-  for (const LogColumn& column : table.columns) names.push_back(column.name);
+  const std::vector<std::string> names = table.column_names();
   throw Error({.place = place,
                .problem = fmt::format("{} has no column '{}'", table.source.file, name),
                .found = "the columns " + joined(names),
@@ -179,6 +271,7 @@ LogColumn& column_named(LogTable& table, const std::string& name, const std::str
 }
 
 TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {
+  drop_columns(table, mapping);
   UsedTable used(table, mapping);
   const auto masks = freshness_of(table);
   std::set<const LogColumn*> consumed;
@@ -192,9 +285,31 @@ TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {
     all.push_back(channel_from_rule(rule, used, mapping.file));
     consumed.insert(all.back().column);
   }
-  for (LogColumn& column : table.columns)
-    if (!consumed.contains(&column) && (table.has_units || split_channel_name(column.name)))
+  std::vector<std::string> left_out;
+  for (LogColumn& column : table.columns) {
+    if (consumed.contains(&column)) continue;
+    const bool is_left_out = !column.has_unit() && (!mapping.channels.empty() || !table.has_units);
+    if (!is_left_out && (column.time == TimeKind::none || column.has_unit()))
       all.push_back(channel_from_column(column, used));
+    else if (table.has_units && column.time == TimeKind::none)
+      left_out.push_back(column.name);
+  }
+  if (!left_out.empty()) table.notes.push_back(note_of_left_out(left_out));
+  LogColumn* const times = time_column(table, consumed);
+  if (times != nullptr && mapping.rate_Hz == 0.0 && std::ranges::none_of(all, is_clock)) {
+    all.push_back(
+        {.channel = {.name = "t_s", .values = used.converted(*times, 1.0, 0.0)}, .column = times});
+    table.notes.push_back(fmt::format("the times in '{}' are the clock", printable(times->name)));
+  } else if (times != nullptr && mapping.rate_Hz != 0.0) {
+    table.notes.push_back(fmt::format("the times in '{}' are not read: the mapping has a rate",
+                                      printable(times->name)));
+  }
+  if (mapping.rate_Hz == 0.0 && std::ranges::none_of(all, is_clock))
+    if (TableChannel* const made = channel_in_seconds(all)) {
+      made->channel.name = "t_s";
+      table.notes.push_back(
+          fmt::format("the times in '{}' are the clock", printable(made->column->name)));
+    }
   refuse_duplicates(all, table);
   for (const auto& [mask, column] : masks)
     for (TableChannel& made : all)

@@ -25,6 +25,7 @@ struct TableChannels {
 
 /// Renames and converts the columns, and puts freshness columns to their channels. The values of
 /// the columns are moved into the channels, except for the column of `split_by`; the names stay.
+/// Columns that the mapping drops are removed, and what was assumed is added to the notes.
 [[nodiscard]] TableChannels channels_of_table(LogTable& table, const Mapping& mapping);
 
 /// What a value in that SI unit on the motor's side of a gear is multiplied by on its output side;

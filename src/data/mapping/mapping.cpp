@@ -142,13 +142,39 @@ double zero_of(const std::string& recording, const Channel& channel, const ZeroR
   return rule.mid_range ? 0.5 * (lowest + highest) : sum / count;
 }
 
-Recording recording_of(const LogTable& table, TableChannels& columns, const NamedRows& run,
+/// The rows from which on every held channel has a value.
+Rows rows_with_held_values(const TableChannels& columns, const NamedRows& run,
+                           const Mapping& mapping) {
+  Rows rows = run.rows;
+  for (const TableChannel& column : columns.channels) {
+    const Channel& channel = column.channel;
+    if (std::ranges::find(mapping.hold, channel.name) == mapping.hold.end()) continue;
+    const auto begin = channel.values.begin();
+    const auto end = begin + static_cast<std::ptrdiff_t>(run.rows.end);
+    const auto first = std::find_if(begin + static_cast<std::ptrdiff_t>(run.rows.begin), end,
+                                    [](double value) { return !std::isnan(value); });
+    if (first == end)
+      throw Error({.place = fmt::format("{}: hold: {}", mapping.file, channel.name),
+                   .problem = "nothing was measured in " + run.name,
+                   .advice = "Leave the channel out of  hold:"});
+    rows.begin = std::max(rows.begin, static_cast<std::size_t>(first - begin));
+  }
+  return rows;
+}
+
+Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows run,
                        const Mapping& mapping, double rate_Hz) {
+  const Rows all_rows = run.rows;
+  run.rows = rows_with_held_values(columns, run, mapping);
+  const std::size_t trimmed = run.rows.begin - all_rows.begin;
   const RecordClock clock = record_clock(table, columns, run.rows, mapping, rate_Hz);
   std::vector<Channel> channels;
-  for (TableChannel& column : columns.channels) channels.push_back(cut(column.channel, run.rows));
+  for (TableChannel& column : columns.channels) channels.push_back(cut(column.channel, all_rows));
   for (const std::string& name : mapping.hold)
     hold(channel_of_rule(channels, name, mapping, "hold"));
+  if (trimmed > 0)
+    for (Channel& channel : channels)
+      channel = cut(channel, {.begin = trimmed, .end = all_rows.size()});
   std::size_t samples = run.rows.size();
   if (columns.clock && mapping.clock.resample_Hz > 0.0) {
     const auto stamps = spread_within_stamps(
@@ -171,6 +197,12 @@ Recording recording_of(const LogTable& table, TableChannels& columns, const Name
   Recording recording(run.name, clock.sample_rate_Hz, clock.start_s);
   recording.source = table.source;
   recording.zeros = mapping.zero;
+  recording.notes = table.notes;
+  recording.not_read = table.not_read;
+  if (trimmed > 0)
+    recording.notes.push_back(
+        fmt::format("the first {} {} before every held channel has a value {} left out", trimmed,
+                    trimmed == 1 ? "sample" : "samples", trimmed == 1 ? "is" : "are"));
   for (Channel& channel : channels) recording.add(std::move(channel));
   return recording;
 }

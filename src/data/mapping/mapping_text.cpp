@@ -39,14 +39,15 @@ class MappingWriter {
     yaml_ << YAML::EndMap;
   }
   void add(const ClockRule& clock) {
-    if (!clock.rebuild && !(clock.resample_Hz > 0.0)) return;
+    if (!clock.rebuild && !(clock.resample_Hz > 0.0) && clock.format.empty()) return;
     yaml_ << YAML::Key << "clock" << YAML::Value << YAML::Flow << YAML::BeginMap;
     if (clock.rebuild) {
       entry("rebuild", "true");
       entry("max_stray_steps", digits(clock.max_stray_steps));
-    } else {
+    } else if (clock.resample_Hz > 0.0) {
       entry("resample", digits(clock.resample_Hz));
     }
+    if (!clock.format.empty()) entry("format", clock.format);
     yaml_ << YAML::EndMap;
   }
   void entry(const std::string& key, const std::string& value) {
@@ -86,6 +87,8 @@ std::string mapping_text(const Mapping& mapping) {
   writer.map("channels", mapping.channels);
   writer.map("derive", mapping.derive);
   writer.list("drop", mapping.drop);
+  writer.list("missing", mapping.missing);
+  if (mapping.skip_lines > 0) writer.entry("skip_lines", fmt::format("{}", mapping.skip_lines));
   if (!mapping.split_by.empty()) writer.entry("split_by", mapping.split_by);
   writer.add(mapping.clock);
   if (mapping.rate_Hz > 0.0) writer.entry("rate", digits(mapping.rate_Hz));

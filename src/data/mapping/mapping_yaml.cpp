@@ -50,12 +50,17 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
 }
 
 ClockRule clock_rule(const YamlValue& yaml) {
-  yaml.allow_only({"rebuild", "max_stray_steps", "resample"});
+  yaml.allow_only({"rebuild", "max_stray_steps", "resample", "format"});
   ClockRule rule;
   if (const auto rebuild = yaml.find("rebuild")) rule.rebuild = rebuild->boolean();
   if (const auto steps = yaml.find("max_stray_steps"))
     rule.max_stray_steps = steps->positive_number("1");
   if (const auto rate = yaml.find("resample")) rule.resample_Hz = rate->positive_number("Hz");
+  if (const auto format = yaml.find("format")) {
+    rule.format = format->text();
+    if (rule.format.find('%') == std::string::npos)
+      format->refuse("a format of dates, such as %d/%m/%Y %H:%M:%S");
+  }
   if (rule.rebuild && rule.resample_Hz > 0.0)
     yaml.refuse("either rebuild or resample",
                 "rebuild assumes even samples with coarse stamps; resample uses uneven stamps as "
@@ -200,8 +205,8 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
                  .expected = "a mapping",
                  .found = "a manifest (it has files:)",
                  .advice = "Give a manifest in the place of a recording, without --mapping."});
-  of_joints.allow_only({"joints", "channels", "derive", "drop", "split_by", "keep", "clock", "rate",
-                        "zero", "hold", "latency", "computed_from"});
+  of_joints.allow_only({"joints", "channels", "derive", "drop", "missing", "skip_lines", "split_by",
+                        "keep", "clock", "rate", "zero", "hold", "latency", "computed_from"});
   const YamlValue yaml = of_joint(of_joints, joint);
   Mapping mapping;
   mapping.file = yaml.file();
@@ -211,7 +216,9 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
   if (const auto derive = yaml.find("derive"))
     for (const auto& [name, expression] : derive->entries())
       mapping.derive.push_back(definition(name, expression));
-  if (const auto drop = yaml.find("drop")) mapping.drop = drop->texts();
+  if (const auto drop = yaml.find("drop")) mapping.drop = drop->texts_or_empty();
+  if (const auto missing = yaml.find("missing")) mapping.missing = missing->texts();
+  if (const auto lines = yaml.find("skip_lines")) mapping.skip_lines = lines->count();
   if (const auto split = yaml.find("split_by")) mapping.split_by = split->text();
   if (const auto keep = yaml.find("keep")) {
     mapping.keep = numbers(*keep);

@@ -17,7 +17,7 @@ class NumberSetter final : public nlohmann::json_sax<nlohmann::json> {
   NumberSetter(const std::string& topic, TopicTable& table, ReadBudget& budget)
       : name_(topic), table_(table), budget_(budget) {}
 
-  bool null() override { return begin_value(); }
+  bool null() override { return set(kNotMeasured); }
   bool boolean(bool value) override { return set(value ? 1.0 : 0.0); }
   bool number_integer(number_integer_t value) override { return set(static_cast<double>(value)); }
   bool number_unsigned(number_unsigned_t value) override { return set(static_cast<double>(value)); }

@@ -6,15 +6,19 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <utility>
 
+#include "data/byte_source.hpp"
 #include "data/names.hpp"
 #include "data/ros/json_numbers.hpp"
 #include "data/ros/ros_decoder.hpp"
 #include "data/ros/ros_schema.hpp"
+#include "data/ros/unpack_chunk.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/estimate.hpp"
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -80,7 +84,7 @@ class Topics {
     if (topic.problem.empty())
       decode(topic, channel, message);
     else
-      topic.table.end_row(message.log_time_ns, messages_, *budget_);
+      topic.table.end_row(0, message.log_time_ns, messages_, *budget_);
   }
 
   [[nodiscard]] std::string place() const {
@@ -118,14 +122,23 @@ class Topics {
   }
 
   void decode(Topic& topic, const MessageChannel& channel, const LogMessage& message) {
-    std::optional<std::int64_t> stamp_ns;
+    std::int64_t stamp_ns = 0;
     if (topic.decoder) {
-      if (!topic.decoder->decode(message.data, topic.table, *budget_)) refuse(channel, message);
+      std::string_view data = message.data;
+      // No message in CDR begins like this: rosbag2 packed each message.
+      if (channel.encoding == "cdr" && data.starts_with(kZstdMark)) {
+        if (!unpack_message(data, *budget_, unpacked_))
+          throw Error({.place = place(),
+                       .problem = fmt::format("a message of {} that zstd packed is damaged",
+                                              channel.topic)});
+        data = unpacked_;
+      }
+      if (!topic.decoder->decode(data, topic.table, *budget_)) refuse(channel, message);
       stamp_ns = topic.decoder->stamp_ns();
     } else if (!set_json_numbers(message.data, channel.topic, topic.table, *budget_)) {
       refuse(channel, message);
     }
-    topic.table.end_row(stamp_ns.value_or(message.log_time_ns), messages_, *budget_);
+    topic.table.end_row(stamp_ns, message.log_time_ns, messages_, *budget_);
     values_ += topic.table.columns().size();
     if (values_ > options_.values)
       throw Error({.place = place(),
@@ -150,6 +163,7 @@ class Topics {
   const TopicOptions& options_;
   ReadBudget* budget_ = nullptr;
   std::map<std::string, Topic> topics_;
+  std::string unpacked_;
   std::size_t messages_ = 0;
   std::size_t values_ = 0;
   bool is_unfinished_ = false;
@@ -193,12 +207,55 @@ void use_own_names(Topic& topic) {
   for (TopicTable::Column& column : columns) column.name = topic.own_names.at(column.name);
 }
 
-bool has_wanted(const TopicTable& table, const TopicOptions& options) {
-  if (table.rows() == 0 || table.columns().empty()) return false;
-  return options.wanted.empty() ||
-         std::ranges::any_of(table.columns(), [&](const TopicTable::Column& column) {
-           return std::ranges::find(options.wanted, column.name) != options.wanted.end();
-         });
+/// Which columns become channels: those that the options name, and without them those with a unit.
+std::vector<bool> used_columns(const TopicTable& table, const TopicOptions& options) {
+  std::vector<bool> used;
+  for (const TopicTable::Column& column : table.columns())
+    used.push_back(options.wanted.empty()
+                       ? split_channel_name(column.name).has_value()
+                       : std::ranges::find(options.wanted, column.name) != options.wanted.end());
+  return used;
+}
+
+/// The messages of each topic that hold what is used, apart by publishers that fill different fields.
+struct UsedTopics {
+  std::vector<TopicTable> tables;
+  std::vector<std::string> other_columns;  ///< further fields of these topics
+  std::size_t base = 0;                    ///< the table with most rows
+  bool is_own = false;                     ///< the base is a topic that torsio wrote
+};
+
+UsedTopics used_topics(Topics& topics, const TopicOptions& options, ReadBudget& budget) {
+  UsedTopics result;
+  std::size_t rows = 0;
+  for (auto& [name, topic] : topics.all()) {
+    topic.table.finish();
+    use_own_names(topic);
+    const bool is_own = !topic.own_names.empty();  // whose messages all have the same fields
+    const std::vector<bool> used = used_columns(topic.table, options);
+    const bool has_used = std::ranges::find(used, true) != used.end();
+    const bool is_needed = options.wanted.empty() ? !topic.table.columns().empty() : has_used;
+    if (topic.table.rows() == 0 || !is_needed) continue;
+    std::set<std::string> others;
+    for (const TopicTable::Column& column : topic.table.columns()) others.insert(column.name);
+    std::vector<TopicTable> parts;
+    if (is_own)
+      parts.push_back(std::move(topic.table));
+    else
+      parts = topic.table.parts(used, budget);
+    for (TopicTable& table : parts) {
+      table.replace_missing_stamps();
+      if (table.rows() > rows) {
+        rows = table.rows();
+        result.base = result.tables.size();
+        result.is_own = is_own;
+      }
+      for (const TopicTable::Column& column : table.columns()) others.erase(column.name);
+      result.tables.push_back(std::move(table));
+    }
+    result.other_columns.insert(result.other_columns.end(), others.begin(), others.end());
+  }
+  return result;
 }
 
 void add_clock(LogTable& table, const TopicTable& base, std::size_t first) {
@@ -240,19 +297,8 @@ void add_other(LogTable& table, const TopicTable& other, const std::vector<std::
 
 LogTable joined_topics(Topics& topics, const TopicOptions& options, const std::string& name,
                        ReadBudget& budget) {
-  TopicTable* base = nullptr;
-  bool is_own = false;
-  std::vector<TopicTable*> used;
-  for (auto& [topic_name, topic] : topics.all()) {
-    topic.table.finish();
-    use_own_names(topic);
-    if (!has_wanted(topic.table, options)) continue;
-    used.push_back(&topic.table);
-    if (base != nullptr && topic.table.rows() <= base->rows()) continue;
-    base = used.back();
-    is_own = !topic.own_names.empty();
-  }
-  if (base == nullptr) {
+  UsedTopics used = used_topics(topics, options, budget);
+  if (used.tables.empty()) {
     std::vector<std::string> names;
     for (const auto& [topic_name, topic] : topics.all()) names.push_back(topic_name);
     throw Error(
@@ -262,13 +308,16 @@ LogTable joined_topics(Topics& topics, const TopicOptions& options, const std::s
          .found = names.empty() ? "no messages" : "the topics " + joined(names),
          .advice = "torsio check --list FILE prints topics and fields."});
   }
+  TopicTable* const base = &used.tables[used.base];
   LogTable table;
   table.source.file = name;
   table.row_word = "message";
-  table.has_units = is_own && used.size() == 1;
+  table.has_units = used.is_own && used.tables.size() == 1;
+  table.other_columns = std::move(used.other_columns);
   std::vector<std::pair<TopicTable*, std::vector<std::size_t>>> others;
   std::size_t first = 0;
-  for (TopicTable* other : used) {
+  for (TopicTable& other_table : used.tables) {
+    TopicTable* const other = &other_table;
     if (other == base) continue;
     others.emplace_back(other, rows_before(*base, *other));
     const auto& rows = others.back().second;
@@ -280,7 +329,7 @@ LogTable joined_topics(Topics& topics, const TopicOptions& options, const std::s
     throw Error({.place = name,
                  .problem = "the topics were not recorded at the same time",
                  .advice = "torsio check --list FILE prints their times; use those of one topic."});
-  if (!is_own) add_clock(table, *base, first);
+  if (!used.is_own) add_clock(table, *base, first);
   add_base(table, *base, first);
   for (const auto& [other, rows] : others) {
     budget.keep((sizeof(double) + 1) * rows.size() * other->columns().size());
@@ -313,6 +362,7 @@ LogSummary summary_of_messages(std::span<const NamedMessages> files, const Topic
   LogSummary summary{.topics = {}, .is_unfinished = topics.is_unfinished()};
   for (auto& [name, topic] : topics.all()) {
     use_own_names(topic);
+    topic.table.replace_missing_stamps();
     const auto& stamps = topic.table.stamps_ns();
     TopicSummary made{.topic = name,
                       .schema = topic.schema,

@@ -29,11 +29,12 @@ struct TopicOptions {
 };
 
 /// The numbers of messages of ROS (`ros2msg` in CDR, `ros1msg`) and JSON as a table. Its rows are the
-/// messages of the topic that has most of them, its clock `t_s` their `header.stamp`, or where that
-/// is missing the time at which they were recorded, from the first on. Columns of another topic hold
-/// its last value before the row, and are fresh where a message has arrived since the row before;
-/// rows before every topic has had a message are left out. A recording may be several files, in
-/// their order. The fields of a topic that torsio wrote have the names and the clock of its channels.
+/// messages of the topic that has most of them, and that hold the fields that are wanted; its clock `t_s` their
+/// `header.stamp`, or where none has one the time at which they were recorded, from the first on. Columns of
+/// another topic, or of other messages of the topic, hold the last value before the row, and are fresh where a
+/// message has arrived since the row before; rows before every one has had a message are left out. A recording
+/// may be several files, in their order. The fields of a topic that torsio wrote have the names and the clock
+/// that its channels had. Messages that rosbag2 packed are unpacked.
 /// @throws Error naming the file, the message and what helps, also where `wanted` is in no topic.
 [[nodiscard]] LogTable table_of_messages(std::span<const NamedMessages> files,
                                          const std::string& name, const TopicOptions& options = {});

@@ -27,7 +27,7 @@ RosDecoder::RosDecoder(std::string topic, RosSchema schema, RosEncoding encoding
 bool RosDecoder::decode(std::string_view message, TopicTable& table, ReadBudget& budget) {
   constexpr std::size_t kEncapsulation = 4;
   constexpr char kLittleEndianCdr = 1;
-  stamp_ns_.reset();
+  stamp_ns_ = 0;
   table_ = &table;
   budget_ = &budget;
   const bool has_head = encoding_ == RosEncoding::cdr;
@@ -131,7 +131,7 @@ bool RosDecoder::decode_time(Place& place) {
   const std::int64_t stamp_ns = kNanoseconds * *seconds + *nanoseconds;
   if (!place.column) place.column = table_->column(place.name, *budget_);
   table_->set(*place.column, 1e-9 * static_cast<double>(stamp_ns));
-  if (stamp_ns != 0 && place.name == topic_ + "/header/stamp") stamp_ns_ = stamp_ns;
+  if (place.name == topic_ + "/header/stamp") stamp_ns_ = stamp_ns;
   return true;
 }
 

@@ -35,8 +35,8 @@ class RosDecoder {
   /// @throws Error beyond the budget of the file.
   bool decode(std::string_view message, TopicTable& table, ReadBudget& budget);
 
-  /// The `header.stamp` in the last message, unless that is zero or absent.
-  [[nodiscard]] std::optional<std::int64_t> stamp_ns() const noexcept { return stamp_ns_; }
+  /// The `header.stamp` in the last message; 0 if it has none.
+  [[nodiscard]] std::int64_t stamp_ns() const noexcept { return stamp_ns_; }
 
  private:
   /// A field in the messages, with its column, which is found once.
@@ -73,7 +73,7 @@ class RosDecoder {
   ReadBudget* budget_ = nullptr;
   std::vector<std::string> names_;
   std::size_t names_version_ = 0;  ///< counts the changes of `names_`
-  std::optional<std::int64_t> stamp_ns_;
+  std::int64_t stamp_ns_ = 0;
 };
 
 }  // namespace torsio

@@ -4,6 +4,7 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
+#include <cstdint>
 #include <limits>
 #include <memory>
 
@@ -60,6 +61,17 @@ bool unpack_chunk(std::string_view packing, std::string_view packed, std::size_t
   if (packing == "lz4") return unpack_lz4(packed, unpacked);
   if (packing == "bz2") return unpack_bz2(packed, unpacked);
   return false;
+}
+
+bool unpack_message(std::string_view packed, ReadBudget& budget, std::string& unpacked) {
+  constexpr std::uint64_t kMaxBytes = std::uint64_t{256} << 20;
+  constexpr std::uint64_t kBytesPerElement = 16;
+  // What is unknown, or an error, is a larger number.
+  const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  if (size > kMaxBytes) return false;
+  budget.require(size);
+  budget.work(1 + size / kBytesPerElement);
+  return unpack_chunk("zstd", packed, size, unpacked);
 }
 
 }  // namespace torsio
