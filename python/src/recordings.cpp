@@ -268,6 +268,12 @@ void bind_recording(py::module_& module) {
       .def_property_readonly("conditions", &Recording::conditions,
                              "Channels that are constant over the record.")
       .def_property_readonly("file", [](const Recording& self) { return self.source.file; })
+      .def_property_readonly(
+          "notes", [](const Recording& self) { return self.notes; },
+          "What reading the file assumed, in sentences.")
+      .def_property_readonly(
+          "not_read", [](const Recording& self) { return self.not_read; },
+          "Arrays of the file that are not read, with the reason.")
       .def("__len__", &Recording::size)
       .def("__contains__",
            [](const Recording& self, const std::string& channel) { return self.has(channel); })

@@ -170,3 +170,14 @@ def test_a_recording_that_was_not_closed_is_read_with_a_warning(tmp_path):
     (tmp_path / "cut.mcap").write_bytes(b"\x89MCAP0\r\n" + records)
     with pytest.warns(UserWarning, match="was not closed"):
         assert len(torsio.read(tmp_path / "cut.mcap")[0]) == 20
+
+
+def test_what_reading_assumed_is_noted(tmp_path):
+    (tmp_path / "run.csv").write_text("t [s],torque [Nm]\n0,NA\n1,2\n")
+    recording = torsio.read(tmp_path / "run.csv")[0]
+    assert recording.channels == ["torque_Nm"]
+    assert any("'NA' (1)" in note for note in recording.notes)
+    np.savez(tmp_path / "run.npz", t_s=np.arange(3.0), torque_Nm=np.arange(3, dtype=">f2"), z=1j * np.arange(3))
+    recording = torsio.read(tmp_path / "run.npz")[0]
+    np.testing.assert_array_equal(recording["torque_Nm"], [0.0, 1.0, 2.0])
+    assert recording.not_read == ["z (complex numbers, '<c16')"]
