@@ -16,7 +16,9 @@
 #include "data/mapping/column_advice.hpp"
 #include "data/names.hpp"
 #include "data/resample.hpp"
+#include "numerics/quantile.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
 
 namespace torsio {
@@ -27,6 +29,8 @@ constexpr double kLongestGapIntervals = 5.0;
 /// The stamps of one record, with what is needed to complain about them.
 struct Stamps {
   const LogTable& table;
+  const TableChannels& columns;
+  const Mapping& mapping;
   const LogColumn& column;
   Rows rows;
   std::span<const double> values_s;
@@ -37,20 +41,102 @@ struct Stamps {
   }
 };
 
-/// An estimate of the log's rate; repeated stamps contribute only their number.
+/// An estimate of the log's rate, without its gaps; repeated stamps contribute only their number. 0: none
 double rate_of_steps(const Stamps& stamps) {
-  constexpr double kRounding = 1e-3;
-  constexpr double kCoarseRounding = 1e-2;
-  return stamps.report.duplicated > 0 ? simplest_rate(stamps.report.sample_rate_Hz, kCoarseRounding)
-                                      : simplest_rate(1.0 / stamps.report.stamp_step_s, kRounding);
+  constexpr double kSimple = 1e-3;
+  constexpr double kSimpleOfCoarse = 1e-2;
+  const double step_s = stamps.report.stamp_step_s;
+  if (!(step_s > 0.0)) return 0.0;
+  if (stamps.report.duplicated == 0) return simplest_rate(1.0 / step_s, kSimple);
+  double duration_s = 0.0;
+  double steps = 0.0;
+  for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
+    const double interval_s = stamps.values_s[i] - stamps.values_s[i - 1];
+    if (interval_s < 0.0 || interval_s > kLongestGapIntervals * step_s) continue;
+    duration_s += interval_s;
+    steps += 1.0;
+  }
+  return simplest_rate(steps / duration_s, kSimpleOfCoarse);
+}
+
+std::string rate_line(const Stamps& stamps) {
+  const double rate_Hz = rate_of_steps(stamps);
+  return rate_Hz > 0.0 ? fmt::format("rate: {:.6g}Hz", rate_Hz)
+                       : std::string("rate: with the sample rate of the log");
+}
+
+/// `clock:` of the mapping, with what it has already.
+std::string clock_line(const Stamps& stamps, std::string_view entry, double split_at_s = 0.0) {
+  if (split_at_s == 0.0) split_at_s = stamps.mapping.clock.split_at_gaps_s;
+  return fmt::format("clock: {{{}{}{}}}", entry, !entry.empty() && split_at_s > 0.0 ? ", " : "",
+                     split_at_s > 0.0 ? fmt::format("split_at_gaps: {:.4g}s", split_at_s) : "");
+}
+
+std::string resample_entry(const Stamps& stamps) {
+  const double wanted_Hz = stamps.mapping.clock.resample_Hz;
+  return fmt::format("resample: {:.6g}Hz", wanted_Hz > 0.0 ? wanted_Hz : rate_of_steps(stamps));
 }
 
 std::string remedies(const Stamps& stamps) {
   return fmt::format(
-      "If the samples were taken evenly and only the stamps are coarse, write in a mapping  clock: "
-      "{{rebuild: true}}\n  If they were taken unevenly, write  clock: {{resample: {:.6g}Hz}}  or "
-      "another rate.",
-      rate_of_steps(stamps));
+      "If the samples were taken evenly and only the stamps are coarse, write in a mapping  {}\n  "
+      "If "
+      "they were taken unevenly, write  {}  or another rate.",
+      clock_line(stamps, "rebuild: true"), clock_line(stamps, resample_entry(stamps)));
+}
+
+/// What straight lines over so many intervals miss in their middle, at most except for a twentieth of the places.
+double missed_by_lines(const std::vector<double>& values, Rows rows, std::size_t intervals) {
+  constexpr double kUsual = 0.95;
+  constexpr std::size_t kEnough = 2000;
+  std::vector<double> missed;
+  const std::size_t stride = std::max<std::size_t>(1, rows.size() / kEnough);
+  for (std::size_t i = rows.begin; i + intervals < rows.end; i += stride) {
+    const std::size_t middle = i + intervals / 2;
+    const double share = static_cast<double>(middle - i) / static_cast<double>(intervals);
+    const double each =
+        std::abs(values[middle] - std::lerp(values[i], values[i + intervals], share));
+    if (std::isfinite(each)) missed.push_back(each);
+  }
+  return missed.empty() ? 0.0 : quantile(std::move(missed), kUsual);
+}
+
+/// Whether a gap is so short that straight lines over it are as good as the measurements of every channel: they miss
+/// at most a hundredth of its range, or twice its noise.
+bool is_bridged_well(const Stamps& stamps, double gap_s) {
+  constexpr double kMissedShare = 0.01;
+  constexpr double kOverNoise = 2.0;
+  const auto intervals = static_cast<std::size_t>(std::ceil(gap_s / stamps.report.stamp_step_s));
+  if (2 * intervals > stamps.rows.size()) return false;
+  return std::ranges::all_of(stamps.columns.channels, [&](const TableChannel& column) {
+    const Channel& channel = column.channel;
+    if (!channel.fresh.empty()) return true;  // held
+    double lowest = HUGE_VAL;
+    double highest = -HUGE_VAL;
+    for (std::size_t i = stamps.rows.begin; i < stamps.rows.end; ++i)
+      if (std::isfinite(channel.values[i]))
+        lowest = std::min(lowest, channel.values[i]),
+        highest = std::max(highest, channel.values[i]);
+    return missed_by_lines(channel.values, stamps.rows, intervals) <=
+           std::max(kMissedShare * (highest - lowest),
+                    kOverNoise * missed_by_lines(channel.values, stamps.rows, 2));
+  });
+}
+
+double usual_limit_s(const Stamps& stamps) {
+  const double period_s =
+      stamps.mapping.clock.resample_Hz > 0.0 ? 1.0 / stamps.mapping.clock.resample_Hz : 0.0;
+  return std::max(kLongestGapIntervals * stamps.report.stamp_step_s, period_s);
+}
+
+bool is_too_long(const Stamps& stamps, double gap_s) {
+  if (stamps.mapping.clock.max_gap_s > 0.0) return gap_s > stamps.mapping.clock.max_gap_s;
+  return gap_s > usual_limit_s(stamps) && !is_bridged_well(stamps, gap_s);
+}
+
+std::string split_advice(const Stamps& stamps) {
+  return fmt::format("Make a recording of each part, in a mapping:  {}",
+                     clock_line(stamps, resample_entry(stamps), usual_limit_s(stamps)));
 }
 
 /// Samples that a log lacks: whole intervals too many, here and there.
@@ -84,18 +170,63 @@ void refuse_lost(const Stamps& stamps) {
   const Loss loss = lost_samples(stamps);
   if (loss.samples == 0) return;
   const double before_s = stamps.values_s[loss.first - 1];
-  const auto gap = static_cast<double>(loss.longest + 1);
+  const double longest_s = static_cast<double>(loss.longest + 1) * stamps.report.stamp_step_s;
   throw ClockError(
       {.place = stamps.place(loss.first),
        .problem = fmt::format("{} {} missing, the first after t = {:.6g} s", loss.samples,
                               loss.samples == 1 ? "sample is" : "samples are", before_s),
        .expected = fmt::format("an interval near {:.6g} s", stamps.report.stamp_step_s),
        .found = fmt::format("{:.6g} s", stamps.values_s[loss.first] - before_s),
-       .advice = gap > kLongestGapIntervals
-                     ? "Cut the log there into two files: the gap is too long for interpolation."
-                     : fmt::format("Fill it with straight lines, in a mapping:  clock: {{resample: "
-                                   "{:.6g}Hz}}",
-                                   rate_of_steps(stamps))});
+       .advice = is_too_long(stamps, longest_s) ? split_advice(stamps)
+                                                : "Fill it with straight lines, in a mapping:  " +
+                                                      clock_line(stamps, resample_entry(stamps))});
+}
+
+/// What a number of the clock's column is in seconds.
+double clock_factor(const Stamps& stamps) {
+  const auto& rules = stamps.mapping.channels;
+  if (const auto rule = std::ranges::find(rules, stamps.column.name, &ChannelRule::from);
+      rule != rules.end())
+    return column_factor(*rule, stamps.column).value_or(1.0);
+  const auto parts = split_channel_name(stamps.column.full_name());
+  return parts ? parts->unit->scale : 1.0;
+}
+
+/// A counter of the logger that overflows, or a second log after the first one.
+void refuse_new_beginning(const Stamps& stamps) {
+  constexpr double kNear = 2.0;  // intervals
+  const double step_s = stamps.report.stamp_step_s;
+  if (!(step_s > 0.0)) return;
+  for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
+    const double back_s = stamps.values_s[i - 1] - stamps.values_s[i];
+    if (!(back_s > kLongestGapIntervals * step_s)) continue;
+    const double factor = clock_factor(stamps);
+    for (const int bits : {16, 24, 31, 32}) {
+      for (const double tick_s : {1.0, 1e-3, 1e-6, 1e-9}) {
+        const double span_s = std::exp2(bits) * tick_s;
+        if (std::abs(back_s + step_s - span_s) > kNear * step_s) continue;
+        const auto rule =
+            std::ranges::find(stamps.mapping.channels, stamps.column.name, &ChannelRule::from);
+        const std::string span = fmt::format("unwrap: {:.10g}", span_s / factor);
+        throw ClockError(
+            {.place = stamps.place(i),
+             .problem = fmt::format("the clock begins again after 2^{} of its ticks of {:g} s",
+                                    bits, tick_s),
+             .expected = fmt::format("more than {} s", stamps.values_s[i - 1]),
+             .found = fmt::format("{} s", stamps.values_s[i]),
+             .advice = rule != stamps.mapping.channels.end()
+                           ? fmt::format("Mapping: add  {}  to the rule of {}.", span, rule->name)
+                           : fmt::format("Mapping: channels: {{t_s: {{from: {}, {}}}}}",
+                                         stamps.column.name, span)});
+      }
+    }
+    throw ClockError({.place = stamps.place(i),
+                      .problem = "the clock starts again, as if two logs were in one file",
+                      .expected = fmt::format("more than {} s", stamps.values_s[i - 1]),
+                      .found = fmt::format("{} s", stamps.values_s[i]),
+                      .advice = fmt::format("Make a recording of each part, in a mapping:  {}",
+                                            clock_line(stamps, "", usual_limit_s(stamps)))});
+  }
 }
 
 void refuse_unusable(const Stamps& stamps) {
@@ -112,12 +243,15 @@ void refuse_unusable(const Stamps& stamps) {
          .found = "nothing",
          .advice = "Remove the line, or drop the clock column and give the rate."});
   }
+  refuse_new_beginning(stamps);
   if (!(stamps.report.sample_rate_Hz > 0.0))
     throw ClockError(
         {.place = stamps.place(stamps.rows.size() - 1),
          .problem = "the last time stamp is not after the first",
          .found = fmt::format("{} s after {} s", stamps.values_s.back(), stamps.values_s.front()),
-         .advice = "Drop the clock column in a mapping and give the rate:  rate: 1000Hz"});
+         .advice = fmt::format(
+             "Drop the clock column in a mapping and give the rate:  drop: [{}] and  {}",
+             stamps.column.name, rate_line(stamps))});
 }
 
 void refuse_not_increasing(const Stamps& stamps, const std::string& advice) {
@@ -166,13 +300,19 @@ double rebuilt_rate(const Stamps& stamps, double max_stray_steps) {
          .expected = fmt::format("at most {} stamp steps of {:.4g} s away from an even spread",
                                  max_stray_steps, report.stamp_step_s),
          .found = fmt::format("{:.2f} steps", steps),
-         .advice = fmt::format("Leave this record out (keep:), or accept it knowingly:  clock: "
-                               "{{rebuild: true, max_stray_steps: {:.0f}}}",
-                               std::ceil(steps))});
+         .advice = fmt::format(
+             "Put the samples where their stamps are:  {}\n  Where the stamps are wrong by so much "
+             "and "
+             "the samples even:  {}",
+             clock_line(stamps, resample_entry(stamps)),
+             clock_line(stamps,
+                        fmt::format("rebuild: true, max_stray_steps: {:.0f}", std::ceil(steps))))});
   return report.sample_rate_Hz;
 }
 
 void refuse_gaps(const Stamps& stamps) {
+  double longest_s = 0.0;
+  std::size_t longest = 0;
   for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
     const double interval = stamps.values_s[i] - stamps.values_s[i - 1];
     if (interval < 0.0)
@@ -180,15 +320,23 @@ void refuse_gaps(const Stamps& stamps) {
                         .problem = "the clock runs backward",
                         .expected = fmt::format("at least {} s", stamps.values_s[i - 1]),
                         .found = fmt::format("{} s", stamps.values_s[i]),
-                        .advice = "Cut the log there into two files."});
-    if (interval > kLongestGapIntervals * stamps.report.stamp_step_s)
-      throw ClockError({.place = stamps.place(i),
-                        .problem = "a gap too long to interpolate over",
-                        .expected = fmt::format("at most {} intervals of {:.4g} s",
-                                                kLongestGapIntervals, stamps.report.stamp_step_s),
-                        .found = fmt::format("{:.4g} s", interval),
-                        .advice = "Cut the log there into two files."});
+                        .advice = remedies(stamps)});
+    if (interval > longest_s) longest_s = interval, longest = i;
   }
+  if (!is_too_long(stamps, longest_s)) return;
+  const double max_gap_s = stamps.mapping.clock.max_gap_s;
+  throw ClockError(
+      {.place = stamps.place(longest),
+       .problem = "a gap too long to interpolate over",
+       .expected = max_gap_s > 0.0 ? fmt::format("at most {:.4g} s (max_gap)", max_gap_s)
+                                   : fmt::format("at most {:.4g} s, or an interval over which "
+                                                 "straight lines follow every channel",
+                                                 usual_limit_s(stamps)),
+       .found = fmt::format("{:.4g} s", longest_s),
+       .advice =
+           split_advice(stamps) +
+           fmt::format("\n  Beside resample:, max_gap: {:.4g}s accepts straight lines over it.",
+                       1.01 * longest_s)});
 }
 
 /// The mapping of the first column that may be the clock.
@@ -230,7 +378,7 @@ RecordClock record_clock(const LogTable& table, const TableChannels& columns, Ro
                  .advice = "Remove 'rate:', or drop the column:  drop: [" + column.name + "]"});
   const std::span<const double> values_s =
       std::span(columns.clock->channel.values).subspan(rows.begin, rows.size());
-  const Stamps stamps{table, column, rows, values_s, inspect_clock(values_s)};
+  const Stamps stamps{table, columns, mapping, column, rows, values_s, inspect_clock(values_s)};
   refuse_unusable(stamps);
   RecordClock clock{.start_s = values_s.front()};
   if (mapping.clock.rebuild) {
@@ -242,6 +390,36 @@ RecordClock record_clock(const LogTable& table, const TableChannels& columns, Ro
     clock.sample_rate_Hz = even_rate(stamps);
   }
   return clock;
+}
+
+std::vector<Rows> parts_between_gaps(std::span<const double> stamps_s, Rows rows, double gap_s) {
+  constexpr std::size_t kFewest = 2;  // have a rate
+  std::vector<Rows> parts;
+  for (std::size_t begin = rows.begin, end = begin; begin < rows.end; begin = end) {
+    do ++end;
+    while (end < rows.end && stamps_s[end] >= stamps_s[end - 1] &&
+           stamps_s[end] - stamps_s[end - 1] <= gap_s);
+    if (const Rows part{.begin = begin, .end = end}; part.size() >= kFewest) parts.push_back(part);
+  }
+  return parts;
+}
+
+Rows rows_between(const TableChannels& columns, std::size_t rows, const Mapping& mapping,
+                  double rate_Hz) {
+  const double rate = mapping.rate_Hz > 0.0 ? mapping.rate_Hz : rate_Hz;
+  const auto time_s = [&](std::size_t row) {
+    if (!columns.clock) return static_cast<double>(row) / rate;
+    const std::vector<double>& stamps_s = columns.clock->channel.values;
+    return stamps_s[row] - stamps_s.front();
+  };
+  Rows used{.begin = 0, .end = rows};
+  if (mapping.from_s > 0.0)
+    while (used.begin < rows && !(time_s(used.begin) >= mapping.from_s)) ++used.begin;
+  if (std::isfinite(mapping.to_s)) {
+    used.end = used.begin;
+    while (used.end < rows && time_s(used.end) <= mapping.to_s) ++used.end;
+  }
+  return used;
 }
 
 std::vector<double> spread_within_stamps(std::span<const double> stamps) {

@@ -27,6 +27,15 @@ struct RecordClock {
 [[nodiscard]] RecordClock record_clock(const LogTable& table, const TableChannels& columns,
                                        Rows rows, const Mapping& mapping, double rate_Hz);
 
+/// The parts of some rows between intervals that are longer than `gap_s`, and from stamps that are earlier than those before. A
+/// single row is left out: it has no rate.
+[[nodiscard]] std::vector<Rows> parts_between_gaps(std::span<const double> stamps_s, Rows rows,
+                                                   double gap_s);
+
+/// The rows of a log that `from` and `to` of the mapping select; without clock by the sample rate.
+[[nodiscard]] Rows rows_between(const TableChannels& columns, std::size_t rows,
+                                const Mapping& mapping, double rate_Hz);
+
 /// Samples that share a stamp, spread evenly up to the next stamp (the last ones as those before),
 /// so that stamps coarser than the sampling give a time for each sample.
 [[nodiscard]] std::vector<double> spread_within_stamps(std::span<const double> stamps_s);

@@ -12,6 +12,17 @@
 #include "torsio/core/units.hpp"
 
 namespace torsio {
+namespace {
+
+void require_marks(const std::string& place, std::size_t samples,
+                   const std::vector<std::uint8_t>& fresh) {
+  if (fresh.size() != samples)
+    throw Error({.place = place,
+                 .expected = fmt::format("{} marks of freshness", samples),
+                 .found = fmt::format("{}", fresh.size())});
+}
+
+}  // namespace
 
 Recording::Recording(std::string name, double sample_rate_Hz, double start_s)
     : name_(std::move(name)), sample_rate_Hz_(sample_rate_Hz), start_s_(start_s) {
@@ -48,11 +59,14 @@ void Recording::add(Channel channel) {
     throw Error({.place = place,
                  .expected = fmt::format("{} samples, as in {}", size(), channels_.front().name),
                  .found = fmt::format("{}", channel.values.size())});
-  if (!channel.fresh.empty() && channel.fresh.size() != channel.values.size())
-    throw Error({.place = place,
-                 .expected = fmt::format("{} marks of freshness", channel.values.size()),
-                 .found = fmt::format("{}", channel.fresh.size())});
+  if (!channel.fresh.empty()) require_marks(place, channel.values.size(), channel.fresh);
   channels_.push_back(std::move(channel));
+}
+
+void Recording::mark_fresh(std::string_view channel, std::vector<std::uint8_t> fresh) {
+  const auto marked = channels_.begin() + (&this->channel(channel) - channels_.data());
+  require_marks(name_ + ": " + marked->name, marked->values.size(), fresh);
+  marked->fresh = std::move(fresh);
 }
 
 void Recording::add_condition(std::string name, double value) {

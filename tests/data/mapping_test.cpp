@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -154,6 +155,58 @@ computed_from: {torque_Nm: [iq_A]}
   EXPECT_EQ(mapping_text(Mapping{}), "");
   EXPECT_EQ(mapping_text(parse_mapping("{clock: {resample: 400Hz}}", "m")),
             "clock: {resample: 400}\n");
+}
+
+TEST(Mapping, KeepsTheRulesOfGapsAndCodings) {
+  const std::string text =
+      "channels:\n  torque_Nm: {from: raw, modulus: 65536}\n"
+      "clock: {resample: 100, max_gap: 0.5, split_at_gaps: 2}\n";
+  EXPECT_EQ(mapping_text(parse_mapping(text, "m")), text);
+}
+
+TEST(Mapping, DecodesNumbersBeforeTheirUnit) {
+  const std::string csv = "t_s,raw\n0,1\n1,65535\n2,65534\n3,2\n";
+  const auto values = [&](const std::string& coding) {
+    return read(csv, "channels: {torque_Nm: {from: raw, unit: Nm, scale: 0.5, " + coding + "}}")[0]
+        .channel("torque_Nm")
+        .values;
+  };
+  EXPECT_EQ(values("modulus: 65536"), (std::vector{0.5, -0.5, -1.0, 1.0}));
+  EXPECT_EQ(values("unwrap: 65536"), (std::vector{0.5, -0.5, -1.0, 1.0}));
+  EXPECT_EQ(values("sign_bit: 32768"), (std::vector{0.5, -16383.5, -16383.0, 1.0}));
+}
+
+TEST(Mapping, AMaskIsOneWhereverItComesFrom) {
+  const std::string csv = "t_s,torque_Nm,neu\n0,1,1\n1,1,0\n2,3,1\n3,3,0\n";
+  const std::vector<std::uint8_t> marks{1, 0, 1, 0};
+  EXPECT_EQ(read(csv, "channels: {torque_fresh_1: neu}")[0].channel("torque_Nm").fresh, marks);
+  Recording derived = read(csv, "channels: {neu_1: neu}")[0];
+  add_derived(derived, {{"torque_fresh_1", "neu_1"}});
+  EXPECT_EQ(derived.channel("torque_Nm").fresh, marks);
+  EXPECT_THROW(add_derived(derived, {{"torque_fresh_1", "2 * neu_1"}}), Error);
+  EXPECT_EQ(read(csv, "{drop: [neu], hold: [torque_Nm]}")[0].channel("torque_Nm").fresh, marks);
+}
+
+TEST(Mapping, SplitsALogAtGapsAndAtANewBeginning) {
+  const std::string csv = "t_s,x_m\n0,1\n1,2\n2,3\n9,4\n10,5\n3,6\n4,7\n5,8\n";
+  const std::vector<Recording> parts = read(csv, "clock: {split_at_gaps: 5s}");
+  ASSERT_EQ(parts.size(), 3U);
+  EXPECT_EQ(parts[1].channel("x_m").values, (std::vector{4.0, 5.0}));
+  EXPECT_EQ(parts[1].time_s(0), 9.0);
+  EXPECT_EQ(parts[2].size(), 3U);
+}
+
+TEST(Mapping, UsesThePartOfALogBetweenFromAndTo) {
+  const std::string csv = "t_s,x_m\n100,1\n101,2\n102,3\n103,4\n";
+  EXPECT_EQ(read(csv, "{from: 1s, to: 2s}")[0].channel("x_m").values, (std::vector{2.0, 3.0}));
+  EXPECT_THROW((void)read(csv, "from: 50s"), Error);
+}
+
+TEST(Mapping, UnwrapsTheCounterOfAClock) {
+  const std::string csv = "t_us,x_m\n4294957296,1\n4294967295,2\n9999,3\n19999,4\n";
+  const Recording recording = read(csv, "channels: {t_s: {from: t_us, unwrap: 4294967296}}")[0];
+  EXPECT_NEAR(recording.sample_rate_Hz(), 100.0, 1.0);
+  EXPECT_EQ(recording.size(), 4U);
 }
 
 TEST(Mapping, ALogWithoutAClockTakesTheGivenRate) {

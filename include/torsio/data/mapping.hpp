@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <string>
 #include <string_view>
@@ -12,7 +13,7 @@
 
 namespace torsio {
 
-/// A channel made from one column: `channel = sign * scale * SI(column) + offset`. With a gear ratio n
+/// A channel made from one column: `channel = sign * scale * SI(decoded column) + offset`. With a gear ratio n
 /// the column is of the motor's side of a gear and the channel of its output: an angle or a rate of
 /// one is divided by n, a torque or its rate multiplied by n.
 struct ChannelRule {
@@ -23,6 +24,10 @@ struct ChannelRule {
   double scale = 1.0;  ///< from SI to SI; needed where the quantities differ
   double offset = 0.0;
   double gear_ratio = 1.0;
+  // As the column has them, before all others; 0: not coded so.
+  double sign_bit = 0.0;  ///< from this number on negative: -(number - sign_bit)
+  double modulus = 0.0;   ///< from half of it on negative: number - modulus
+  double unwrap = 0.0;    ///< the span after which a counter or an angle begins again
 };
 
 /// How the time stamps are used. Default: they must be uniform.
@@ -32,6 +37,12 @@ struct ClockRule {
   /// Interpolate from uneven stamps onto this rate; samples that share a stamp are first spread
   /// evenly up to the next one. 0: no.
   double resample_Hz = 0.0;
+  /// With resample: the longest interval that is interpolated over. 0: five usual ones, a period of the new rate, or
+  /// as long as straight lines follow the channels elsewhere in the log.
+  double max_gap_s = 0.0;
+  /// Each part between two longer intervals, and from a stamp that is earlier than the one before, becomes a
+  /// recording. 0: no.
+  double split_at_gaps_s = 0.0;
   std::string format = {};  ///< how a CSV file writes dates, for strptime; empty: ISO 8601
 };
 
@@ -53,6 +64,9 @@ struct Mapping {
   std::vector<double> keep;          ///< values of `split_by` that are kept; empty: all
   ClockRule clock;
   double rate_Hz = 0.0;  ///< sample rate of a log without clock; 0: not given
+  // The part of the log that is used, from its first sample on.
+  double from_s = 0.0;
+  double to_s = std::numeric_limits<double>::infinity();
   std::vector<ZeroRule> zero;
   std::vector<std::string> hold;
   std::vector<LatencyRule> latency;
@@ -76,8 +90,8 @@ struct Mapping {
 /// The mappings for known logs that come with torsio: "cycloidal_drive".
 [[nodiscard]] std::vector<std::string> ready_mapping_names();
 
-/// The mapping as YAML that `parse_mapping` reads back, without its file and without `keep`, which
-/// selects records of one log. Empty if nothing else is set.
+/// The mapping as YAML that `parse_mapping` reads back, without its file and without `keep`, `from` and `to`, which
+/// select parts of one log. Empty if nothing else is set.
 [[nodiscard]] std::string mapping_text(const Mapping& mapping);
 
 /// Evaluates the definitions over the recording and adds them as channels. Where a channel that one

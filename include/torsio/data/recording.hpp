@@ -54,6 +54,9 @@ class Recording {
   /// @throws Error if the length differs from the other channels', the name exists, or it does not
   /// end in an SI unit.
   void add(Channel channel);
+  /// Marks the samples of a channel at which its sensor measured again (`Channel::fresh`).
+  /// @throws Error that lists the channels if there is none of that name, or another length is expected.
+  void mark_fresh(std::string_view channel, std::vector<std::uint8_t> fresh);
   /// A condition of the whole record (support position, temperature): a constant channel.
   void add_condition(std::string name, double value);
   [[nodiscard]] const std::vector<std::string>& conditions() const noexcept { return conditions_; }

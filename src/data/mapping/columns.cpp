@@ -11,14 +11,13 @@
 
 #include "data/log_table.hpp"
 #include "data/mapping/column_advice.hpp"
+#include "data/mapping/number_coding.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
-
-constexpr std::string_view kFreshEnding = "_fresh_1";
 
 /// The name without its unit, or the whole name if it has none (a mapping may specify the unit).
 std::string_view quantity_of(std::string_view column_name) {
@@ -40,11 +39,13 @@ class UsedTable {
   [[nodiscard]] LogTable& table() const noexcept { return table_; }
   void read_again(const LogColumn& column) { read_again_.insert(&column); }
 
-  /// scale * column + offset. @throws Error where that is too large for a number.
-  [[nodiscard]] std::vector<double> converted(LogColumn& column, double scale,
-                                              double offset) const {
-    std::vector<double> values =
-        read_again_.contains(&column) ? column.values : std::move(column.values);
+  /// The column as it is, for the last time if it is not read again.
+  [[nodiscard]] std::vector<double> taken(LogColumn& column) const {
+    return read_again_.contains(&column) ? column.values : std::move(column.values);
+  }
+  /// scale * values + offset. @throws Error where that is too large for a number.
+  [[nodiscard]] std::vector<double> converted(const LogColumn& column, std::vector<double> values,
+                                              double scale, double offset) const {
     if (scale == 1.0 && offset == 0.0) return values;  // keeps even the sign of a zero
     for (std::size_t row = 0; row < values.size(); ++row) {
       const double raw = std::exchange(values[row], scale * values[row] + offset);
@@ -73,6 +74,19 @@ const Unit* unit_of_source(const ChannelRule& rule, const LogColumn& column,
   return from ? from->unit : unit_of_channel;
 }
 
+/// From SI to SI.
+double factor_of(const ChannelRule& rule, const Unit& unit_of_channel) {
+  return rule.sign * rule.scale *
+         gear_scale(unit_of_channel.si_suffix, rule.gear_ratio).value_or(1.0);
+}
+
+std::vector<double> decoded(std::vector<double> values, const ChannelRule& rule) {
+  if (rule.sign_bit > 0.0) decode_sign_bit(values, rule.sign_bit);
+  if (rule.modulus > 0.0) decode_modulus(values, rule.modulus);
+  if (rule.unwrap > 0.0) unwrap(values, rule.unwrap);
+  return values;
+}
+
 TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
                                const std::string& mapping_file) {
   const std::string place = mapping_file + ": channels." + rule.name;
@@ -81,8 +95,7 @@ TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
   if (!name) throw Error({.place = place, .problem = "the name has no unit"});
   const Unit* unit = unit_of_source(rule, column, name->unit);
   if (unit == nullptr) throw Error({.place = place, .problem = "unknown unit '" + rule.unit + "'"});
-  const double scale =
-      rule.sign * rule.scale * gear_scale(name->unit->si_suffix, rule.gear_ratio).value_or(1.0);
+  const double scale = factor_of(rule, *name->unit);
   if (unit->si_suffix != name->unit->si_suffix && rule.scale == 1.0)
     throw Error({.place = place,
                  .expected = fmt::format("a column in a unit of {}", name->unit->si_suffix),
@@ -91,8 +104,9 @@ TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
                                        "('scale:').",
                                        unit->si_suffix, name->unit->si_suffix)});
   return {.channel = {.name = name->si(),
-                      .values = used.converted(column, scale * unit->scale,
-                                               scale * unit->offset + rule.offset)},
+                      .values =
+                          used.converted(column, decoded(used.taken(column), rule),
+                                         scale * unit->scale, scale * unit->offset + rule.offset)},
           .column = &column};
 }
 
@@ -155,7 +169,8 @@ TableChannel channel_from_column(LogColumn& column, const UsedTable& used) {
   refuse_conflict(used.table(), column, *name->unit);
   const bool is_time = column.time != TimeKind::none;
   return {.channel = {.name = name->si(),
-                      .values = used.converted(column, is_time ? 1.0 : name->unit->scale,
+                      .values = used.converted(column, used.taken(column),
+                                               is_time ? 1.0 : name->unit->scale,
                                                is_time ? 0.0 : name->unit->offset)},
           .column = &column};
 }
@@ -202,22 +217,33 @@ TableChannel* channel_in_seconds(std::vector<TableChannel>& all) {
   return std::ranges::count_if(all, is_time) == 1 ? &*std::ranges::find_if(all, is_time) : nullptr;
 }
 
-/// Freshness column -> the column whose samples it marks.
-std::map<const LogColumn*, const LogColumn*> freshness_of(const LogTable& table) {
-  std::map<const LogColumn*, const LogColumn*> marked;
-  for (const LogColumn& mask : table.columns) {
-    std::string_view quantity = mask.name;
-    if (!quantity.ends_with(kFreshEnding)) continue;
-    quantity.remove_suffix(kFreshEnding.size());
-    for (const LogColumn& column : table.columns) {
-      if (quantity_of(column.name) != quantity) continue;
-      if (!marked.emplace(&mask, &column).second)
-        throw Error({.place = table.header_place(mask),
-                     .problem = "two columns could be meant",
-                     .found = marked[&mask]->name + " and " + column.name});
-    }
-  }
-  return marked;
+/// A column that marks the new samples of a channel.
+struct Mask {
+  const LogColumn* column = nullptr;
+  std::string_view quantity;  ///< name without unit: the channel's, or its column's
+};
+
+/// Columns and rules whose names are those of masks.
+std::vector<Mask> masks_of(LogTable& table, const Mapping& mapping) {
+  std::vector<Mask> masks;
+  for (const ChannelRule& rule : mapping.channels)
+    if (const std::string_view quantity = marked_quantity(rule.name); !quantity.empty())
+      masks.push_back(
+          {&column_named(table, rule.from, mapping.file + ": channels." + rule.name), quantity});
+  const auto is_used = [&](const LogColumn& column) {
+    return std::ranges::find(mapping.channels, column.name, &ChannelRule::from) !=
+           mapping.channels.end();
+  };
+  for (const LogColumn& column : table.columns)
+    if (const std::string_view quantity = marked_quantity(column.name);
+        !quantity.empty() && !is_used(column))
+      masks.push_back({&column, quantity});
+  return masks;
+}
+
+/// Whether the mask is one of a channel that this column or this rule makes.
+bool is_marked_by(const Mask& mask, std::string_view column, std::string_view channel) {
+  return mask.quantity == quantity_of(column) || mask.quantity == quantity_of(channel);
 }
 
 std::vector<std::uint8_t> freshness_mask(const LogTable& table, const LogColumn& column) {
@@ -254,6 +280,19 @@ bool is_clock(const TableChannel& made) {
 
 }  // namespace
 
+std::optional<double> column_factor(const ChannelRule& rule, const LogColumn& column) noexcept {
+  const auto name = split_channel_name(rule.name);
+  const Unit* const unit = name ? unit_of_source(rule, column, name->unit) : nullptr;
+  if (unit == nullptr) return std::nullopt;
+  return factor_of(rule, *name->unit) * unit->scale;
+}
+
+std::string_view marked_quantity(std::string_view name) noexcept {
+  constexpr std::string_view kFreshEnding = "_fresh_1";
+  return name.ends_with(kFreshEnding) ? name.substr(0, name.size() - kFreshEnding.size())
+                                      : std::string_view{};
+}
+
 std::optional<double> gear_scale(std::string_view si_unit, double gear_ratio) noexcept {
   if (si_unit == "rad" || si_unit == "rad_s" || si_unit == "rad_s2") return 1.0 / gear_ratio;
   if (si_unit == "Nm" || si_unit == "Nm_s") return gear_ratio;
@@ -273,15 +312,27 @@ LogColumn& column_named(LogTable& table, const std::string& name, const std::str
 TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {
   drop_columns(table, mapping);
   UsedTable used(table, mapping);
-  const auto masks = freshness_of(table);
+  std::vector<Mask> masks = masks_of(table, mapping);
+  // Without a channel that it marks, a column of such a name is a channel itself.
+  std::erase_if(masks, [&](const Mask& mask) {
+    return std::ranges::none_of(table.columns, [&](const LogColumn& column) {
+      const auto rule = std::ranges::find(mapping.channels, column.name, &ChannelRule::from);
+      return &column != mask.column &&
+             is_marked_by(mask, column.name,
+                          rule != mapping.channels.end() ? rule->name : column.name);
+    });
+  });
   std::set<const LogColumn*> consumed;
-  for (const auto& [mask, column] : masks) consumed.insert(mask);
+  for (const Mask& mask : masks) consumed.insert(mask.column);
   if (!mapping.split_by.empty())
     consumed.insert(&column_named(table, mapping.split_by, mapping.file + ": split_by"));
   for (const LogColumn* column : consumed) used.read_again(*column);
 
   std::vector<TableChannel> all;
   for (const ChannelRule& rule : mapping.channels) {
+    if (!marked_quantity(rule.name).empty() &&
+        consumed.contains(&column_named(table, rule.from, mapping.file)))
+      continue;
     all.push_back(channel_from_rule(rule, used, mapping.file));
     consumed.insert(all.back().column);
   }
@@ -298,7 +349,8 @@ TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {
   LogColumn* const times = time_column(table, consumed);
   if (times != nullptr && mapping.rate_Hz == 0.0 && std::ranges::none_of(all, is_clock)) {
     all.push_back(
-        {.channel = {.name = "t_s", .values = used.converted(*times, 1.0, 0.0)}, .column = times});
+        {.channel = {.name = "t_s", .values = used.converted(*times, used.taken(*times), 1.0, 0.0)},
+         .column = times});
     table.notes.push_back(fmt::format("the times in '{}' are the clock", printable(times->name)));
   } else if (times != nullptr && mapping.rate_Hz != 0.0) {
     table.notes.push_back(fmt::format("the times in '{}' are not read: the mapping has a rate",
@@ -311,9 +363,18 @@ TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {
           fmt::format("the times in '{}' are the clock", printable(made->column->name)));
     }
   refuse_duplicates(all, table);
-  for (const auto& [mask, column] : masks)
-    for (TableChannel& made : all)
-      if (made.column == column) made.channel.fresh = freshness_mask(table, *mask);
+  for (const Mask& mask : masks) {
+    const LogColumn* marked = nullptr;
+    for (TableChannel& made : all) {
+      if (!is_marked_by(mask, made.column->name, made.channel.name)) continue;
+      if (marked != nullptr)
+        throw Error({.place = table.header_place(*mask.column),
+                     .problem = "two columns could be meant",
+                     .found = marked->name + " and " + made.column->name});
+      marked = made.column;
+      made.channel.fresh = freshness_mask(table, *mask.column);
+    }
+  }
   for (TableChannel& made : all)
     if (made.channel.fresh.empty()) made.channel.fresh = made.column->fresh;
 

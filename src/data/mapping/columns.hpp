@@ -28,6 +28,14 @@ struct TableChannels {
 /// Columns that the mapping drops are removed, and what was assumed is added to the notes.
 [[nodiscard]] TableChannels channels_of_table(LogTable& table, const Mapping& mapping);
 
+/// What a decoded number of its column is multiplied by to give the channel's value in SI, before the offset; none if
+/// the unit of the channel or of the column is not known.
+[[nodiscard]] std::optional<double> column_factor(const ChannelRule& rule,
+                                                  const LogColumn& column) noexcept;
+
+/// "torque" of "torque_fresh_1", a mask of new samples; empty if the name is none of a mask.
+[[nodiscard]] std::string_view marked_quantity(std::string_view name) noexcept;
+
 /// What a value in that SI unit on the motor's side of a gear is multiplied by on its output side;
 /// none if a gear does not change it.
 [[nodiscard]] std::optional<double> gear_scale(std::string_view si_unit,

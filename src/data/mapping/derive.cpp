@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 
+#include "data/mapping/columns.hpp"
 #include "data/recording_rows.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/estimate.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/data/mapping.hpp"
 
 namespace torsio {
@@ -35,6 +40,29 @@ std::vector<double> evaluated(const Recording& recording, FeaturePipeline& pipel
   return values;
 }
 
+/// The channel whose new samples a channel of that name marks; empty if there is none.
+std::string marked_channel(const Recording& recording, std::string_view name) {
+  const std::string_view quantity = marked_quantity(name);
+  if (quantity.empty()) return {};
+  for (const Channel& channel : recording.channels())
+    if (const auto parts = split_channel_name(channel.name); parts && parts->quantity == quantity)
+      return channel.name;
+  return {};
+}
+
+std::vector<std::uint8_t> mask_from(const Channel& channel, const Recording& recording) {
+  std::vector<std::uint8_t> fresh;
+  for (const double value : channel.values) {
+    if (value != 0.0 && value != 1.0 && std::isfinite(value))
+      throw Error(
+          {.place = fmt::format("{}: {}, sample {}", recording.name(), channel.name, fresh.size()),
+           .expected = "1 (new sample) or 0 (held)",
+           .found = fmt::format("{}", value)});
+    fresh.push_back(value == 1.0 ? 1 : 0);
+  }
+  return fresh;
+}
+
 }  // namespace
 
 void add_derived(Recording& recording, const std::vector<ChannelDefinition>& definitions) {
@@ -45,8 +73,14 @@ void add_derived(Recording& recording, const std::vector<ChannelDefinition>& def
     derived.push_back(
         {.name = definition.name, .values = evaluated(recording, pipeline, definition.name)});
   }
-  for (Channel& channel : derived) recording.add(std::move(channel));
-  recording.definitions.insert(recording.definitions.end(), definitions.begin(), definitions.end());
+  for (std::size_t i = 0; i < derived.size(); ++i) {
+    if (const std::string marked = marked_channel(recording, derived[i].name); !marked.empty()) {
+      recording.mark_fresh(marked, mask_from(derived[i], recording));
+      continue;
+    }
+    recording.add(std::move(derived[i]));
+    recording.definitions.push_back(definitions[i]);
+  }
 }
 
 }  // namespace torsio

@@ -65,6 +65,36 @@ std::vector<NamedRows> records_of(LogTable& table, std::size_t rows, const Mappi
   return {{.name = stem, .rows = {.begin = 0, .end = rows}}};
 }
 
+/// What `from`, `to` and `split_at_gaps` make of the records.
+std::vector<NamedRows> used_parts(const std::vector<NamedRows>& records,
+                                  const TableChannels& columns, Rows used, const Mapping& mapping) {
+  std::vector<NamedRows> parts;
+  for (const NamedRows& record : records) {
+    const Rows rows{.begin = std::max(record.rows.begin, used.begin),
+                    .end = std::min(record.rows.end, used.end)};
+    if (rows.begin >= rows.end) continue;
+    if (!(mapping.clock.split_at_gaps_s > 0.0) || !columns.clock) {
+      parts.push_back({.name = record.name, .rows = rows});
+      continue;
+    }
+    const std::vector<Rows> between =
+        parts_between_gaps(columns.clock->channel.values, rows, mapping.clock.split_at_gaps_s);
+    for (std::size_t k = 0; k < between.size(); ++k)
+      parts.push_back(
+          {.name = between.size() == 1 ? record.name : fmt::format("{}#{}", record.name, k + 1),
+           .rows = between[k]});
+    if (parts.size() > kMaxRecords)
+      throw Error({.place = mapping.file + ": clock.split_at_gaps",
+                   .problem = fmt::format("it gives more than {} records", kMaxRecords),
+                   .advice = "Give a longer time."});
+  }
+  if (parts.empty() && !records.empty())
+    throw Error({.place = mapping.file,
+                 .problem = "from:, to: and split_at_gaps: leave nothing of the log",
+                 .advice = "They are seconds from the first sample of the log on."});
+  return parts;
+}
+
 /// The rows of a channel; all rows are moved out, because then no other recording uses any.
 Channel cut(Channel& channel, Rows rows) {
   if (rows.size() == channel.values.size()) return std::move(channel);
@@ -94,12 +124,16 @@ Channel& channel_of_rule(std::vector<Channel>& channels, const std::string& name
                                     : did_you_mean(name, names)});
 }
 
+/// New samples are those with a value, or in a log that has one in every row, those whose value changes.
 void hold(Channel& channel) {
   channel.fresh.resize(channel.values.size());
+  const bool is_held_already =
+      std::ranges::none_of(channel.values, [](double value) { return std::isnan(value); });
   double last = kNotMeasured;
   for (std::size_t i = 0; i < channel.values.size(); ++i) {
-    channel.fresh[i] = std::isnan(channel.values[i]) ? 0 : 1;
-    if (channel.fresh[i] != 0) last = channel.values[i];
+    const double value = channel.values[i];
+    channel.fresh[i] = std::isnan(value) || (is_held_already && value == last) ? 0 : 1;
+    if (channel.fresh[i] != 0) last = value;
     channel.values[i] = last;
   }
 }
@@ -214,7 +248,8 @@ std::vector<Recording> measured_recordings(LogTable table, const Mapping& mappin
   const std::size_t rows = table.rows();  // the columns are moved out of the table
   TableChannels columns = channels_of_table(table, mapping);
   std::vector<Recording> recordings;
-  for (const NamedRows& run : records_of(table, rows, mapping, name))
+  for (const NamedRows& run : used_parts(records_of(table, rows, mapping, name), columns,
+                                         rows_between(columns, rows, mapping, rate_Hz), mapping))
     recordings.push_back(recording_of(table, columns, run, mapping, rate_Hz));
   return recordings;
 }

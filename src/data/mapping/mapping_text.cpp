@@ -22,6 +22,9 @@ class MappingWriter {
     if (rule.scale != 1.0) entry("scale", digits(rule.scale));
     if (rule.offset != 0.0) entry("offset", digits(rule.offset));
     if (rule.gear_ratio != 1.0) entry("gear_ratio", digits(rule.gear_ratio));
+    if (rule.sign_bit != 0.0) entry("sign_bit", digits(rule.sign_bit));
+    if (rule.modulus != 0.0) entry("modulus", digits(rule.modulus));
+    if (rule.unwrap != 0.0) entry("unwrap", digits(rule.unwrap));
     yaml_ << YAML::EndMap;
   }
   void add(const ChannelDefinition& definition) { entry(definition.name, definition.expression); }
@@ -39,14 +42,17 @@ class MappingWriter {
     yaml_ << YAML::EndMap;
   }
   void add(const ClockRule& clock) {
-    if (!clock.rebuild && !(clock.resample_Hz > 0.0) && clock.format.empty()) return;
+    if (!clock.rebuild && !(clock.resample_Hz > 0.0) && !(clock.split_at_gaps_s > 0.0) &&
+        clock.format.empty())
+      return;
     yaml_ << YAML::Key << "clock" << YAML::Value << YAML::Flow << YAML::BeginMap;
     if (clock.rebuild) {
       entry("rebuild", "true");
       entry("max_stray_steps", digits(clock.max_stray_steps));
-    } else if (clock.resample_Hz > 0.0) {
-      entry("resample", digits(clock.resample_Hz));
     }
+    if (clock.resample_Hz > 0.0) entry("resample", digits(clock.resample_Hz));
+    if (clock.max_gap_s > 0.0) entry("max_gap", digits(clock.max_gap_s));
+    if (clock.split_at_gaps_s > 0.0) entry("split_at_gaps", digits(clock.split_at_gaps_s));
     if (!clock.format.empty()) entry("format", clock.format);
     yaml_ << YAML::EndMap;
   }

@@ -22,7 +22,8 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
     rule.from = yaml.text();
     return rule;
   }
-  yaml.allow_only({"from", "unit", "sign", "scale", "offset", "gear_ratio"});
+  yaml.allow_only(
+      {"from", "unit", "sign", "scale", "offset", "gear_ratio", "sign_bit", "modulus", "unwrap"});
   rule.from = yaml.at("from").text();
   if (const auto unit = yaml.find("unit")) {
     const Unit* const known = find_written_unit(unit->text());
@@ -44,18 +45,32 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
       ratio->refuse("no gear ratio for this unit: angles, their rates and torques have one",
                     "Use scale.");
   }
+  int codings = 0;
+  for (const auto& [key, number] : {std::pair("sign_bit", &ChannelRule::sign_bit),
+                                    {"modulus", &ChannelRule::modulus},
+                                    {"unwrap", &ChannelRule::unwrap}})
+    if (const auto given = yaml.find(key)) {
+      rule.*number = given->factor();
+      if (!(rule.*number > 0.0)) given->refuse("a positive number of the column, like 65536");
+      if (++codings > 1) yaml.refuse("one of sign_bit, modulus and unwrap");
+    }
   if (const auto offset = yaml.find("offset"))
     rule.offset = offset->number(split_channel_name(si_name)->unit->suffix);
   return rule;
 }
 
 ClockRule clock_rule(const YamlValue& yaml) {
-  yaml.allow_only({"rebuild", "max_stray_steps", "resample", "format"});
+  yaml.allow_only({"rebuild", "max_stray_steps", "resample", "max_gap", "split_at_gaps", "format"});
   ClockRule rule;
   if (const auto rebuild = yaml.find("rebuild")) rule.rebuild = rebuild->boolean();
   if (const auto steps = yaml.find("max_stray_steps"))
     rule.max_stray_steps = steps->positive_number("1");
   if (const auto rate = yaml.find("resample")) rule.resample_Hz = rate->positive_number("Hz");
+  if (const auto gap = yaml.find("split_at_gaps")) rule.split_at_gaps_s = gap->positive_number("s");
+  if (const auto gap = yaml.find("max_gap")) {
+    rule.max_gap_s = gap->positive_number("s");
+    if (!(rule.resample_Hz > 0.0)) gap->refuse("resample: beside max_gap");
+  }
   if (const auto format = yaml.find("format")) {
     rule.format = format->text();
     if (rule.format.find('%') == std::string::npos)
@@ -206,7 +221,8 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
                  .found = "a manifest (it has files:)",
                  .advice = "Give a manifest in the place of a recording, without --mapping."});
   of_joints.allow_only({"joints", "channels", "derive", "drop", "missing", "skip_lines", "split_by",
-                        "keep", "clock", "rate", "zero", "hold", "latency", "computed_from"});
+                        "keep", "clock", "rate", "from", "to", "zero", "hold", "latency",
+                        "computed_from"});
   const YamlValue yaml = of_joint(of_joints, joint);
   Mapping mapping;
   mapping.file = yaml.file();
@@ -226,6 +242,11 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
   }
   if (const auto clock = yaml.find("clock")) mapping.clock = clock_rule(*clock);
   if (const auto rate = yaml.find("rate")) mapping.rate_Hz = rate->positive_number("Hz");
+  if (const auto from = yaml.find("from")) mapping.from_s = from->positive_number("s");
+  if (const auto to = yaml.find("to")) {
+    mapping.to_s = to->positive_number("s");
+    if (!(mapping.to_s > mapping.from_s)) to->refuse("a time after from:");
+  }
   if (const auto zero = yaml.find("zero")) mapping.zero = zeros_from(*zero);
   if (const auto hold = yaml.find("hold"))
     for (const YamlValue& name : hold->items())
