@@ -153,6 +153,9 @@ Estimator make_estimator(const ModelFile& model, double sample_rate_Hz) {
   const double longer = std::isfinite(ratio) ? std::max(1.0, ratio) : 1.0;
   for (double& step : resampled.settings.disturbances.largest_step) step *= longer;
   resampled.settings.disturbances.largest_travel *= longer;
+  const double own_Hz = model.settings.sample_rate_Hz;
+  if (own_Hz > 0.0 && std::abs(sample_rate_Hz - own_Hz) > kSameRate * own_Hz)
+    resampled.settings.features = at_sample_rate(model.settings.features, own_Hz, sample_rate_Hz);
   resampled.settings.sample_rate_Hz = sample_rate_Hz;
   return make_estimator(resampled);
 }

@@ -286,6 +286,19 @@ TEST(ChannelsOf, ListsEachChannelOnce) {
   EXPECT_THROW((void)channels_of("a +"), Error);
 }
 
+TEST(AtSampleRate, KeepsLagsAsLongInTimeAsTheyWere) {
+  const FeatureSpec spec{.inputs = {"x_rad", "lag(rate(lag( x_rad,8 )), 4) + lag(y, 10ms)"},
+                         .definitions = {{"y", "lag(max(x_rad, 1), 12)"}}};
+  const FeatureSpec slower = at_sample_rate(spec, 200.0, 50.0);
+  EXPECT_EQ(slower.inputs, (Names{"x_rad", "lag(rate(lag( x_rad, 2)), 1) + lag(y, 10ms)"}));
+  EXPECT_EQ(slower.definitions[0].expression, "lag(max(x_rad, 1), 3)");
+  EXPECT_THROW((void)at_sample_rate({.inputs = {"lag(x_rad, 2)"}, .definitions = {}}, 200.0, 50.0),
+               Error);
+  EXPECT_THROW(
+      (void)at_sample_rate({.inputs = {"lag(x_rad, 2 * 4)"}, .definitions = {}}, 200.0, 50.0),
+      Error);
+}
+
 TEST(SplitInputs, SplitsOnCommasOutsideParentheses) {
   EXPECT_EQ(split_inputs("a, lowpass(b, 10Hz) ,\tmax(c, min(d, e))\n"),
             (Names{"a", "lowpass(b, 10Hz)", "max(c, min(d, e))"}));

@@ -97,6 +97,11 @@ class FeaturePipeline {
   std::unique_ptr<Program> program_;
 };
 
+/// The same features at another sample rate: `lag(x, n)` of n samples is as long in time as before. Expressions without
+/// such a lag do not change.
+/// @throws Error if a lag is not a whole number of samples there.
+[[nodiscard]] FeatureSpec at_sample_rate(FeatureSpec spec, double from_Hz, double to_Hz);
+
 /// The channel names that occur in an expression, in order of appearance. @throws Error if it
 /// cannot be parsed.
 [[nodiscard]] std::vector<std::string> channels_of(std::string_view expression);

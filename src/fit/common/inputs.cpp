@@ -24,11 +24,13 @@
 namespace torsio {
 namespace {
 
-constexpr auto kDefaultInputs = std::to_array<const char*>({
-    "spring_deflection_rad",
-    "lowpass(spring_deflection_rate_rad_s, 10Hz)",
-    "lowpass(joint_speed_rad_s, 10Hz)",
-});
+/// The cut-off of the filtered rates is 10 Hz, in slow logs a fifth of the sample rate.
+std::vector<std::string> default_inputs(double sample_rate_Hz) {
+  const double cut_off_Hz = std::min(10.0, 0.2 * sample_rate_Hz);
+  return {"spring_deflection_rad",
+          fmt::format("lowpass(spring_deflection_rate_rad_s, {:g}Hz)", cut_off_Hz),
+          fmt::format("lowpass(joint_speed_rad_s, {:g}Hz)", cut_off_Hz)};
+}
 
 bool defines(const std::vector<ChannelDefinition>& definitions, std::string_view name) {
   return std::ranges::any_of(definitions,
@@ -181,10 +183,11 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
   const std::vector<ChannelDefinition> definitions = known_definitions(dataset);
   std::vector<std::string> inputs = wanted;
   if (inputs.empty() && !dataset.input_sets.empty()) inputs = dataset.input_sets.front().second;
-  if (inputs.empty() && is_computable(dataset, definitions, kDefaultInputs[0])) {
-    for (const char* input : kDefaultInputs)
-      if (is_computable(dataset, definitions, input)) inputs.emplace_back(input);
-  }
+  if (const auto defaults = default_inputs(dataset.sample_rate_Hz());
+      inputs.empty() && is_computable(dataset, definitions, defaults.front()))
+    std::ranges::copy_if(defaults, std::back_inserter(inputs), [&](const std::string& input) {
+      return is_computable(dataset, definitions, input);
+    });
   const Recording& first = dataset.records.front().recording;
   if (inputs.empty())
     throw UsageError({.place = first.name(),

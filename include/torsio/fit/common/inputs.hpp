@@ -18,8 +18,8 @@ namespace torsio {
 ///     spring_deflection_rate_rad_s = rate(spring_deflection_rad)
 ///     joint_speed_rad_s = rate(joint_angle_rad)
 ///
-/// Without wanted inputs: the dataset's first input set, else the deflection, its 10 Hz-filtered
-/// rate and the filtered joint speed, as far as present.
+/// Without wanted inputs: the dataset's first input set, else the deflection, its rate and
+/// the joint speed, both filtered with 10 Hz or a fifth of a lower sample rate, as far as present.
 /// @throws Error listing the channels if an input needs one that a record lacks, or no default
 /// applies, or if two records define one name differently.
 [[nodiscard]] FeatureSpec resolve_inputs(const Dataset& dataset,
