@@ -102,7 +102,11 @@ Ranking rank_on_common_samples(const Dataset& dataset, Role role, std::span<Scor
   }
   if (!ranking.is_possible()) return ranking;
   const auto targets = targets_of(dataset, role);
-  for (const Candidate& candidate : candidates) score(candidate, uses, targets);
+  for (const Candidate& candidate : candidates) {
+    score(candidate, uses, targets);
+    ranking.best_fit_percent =
+        std::fmax(ranking.best_fit_percent, candidate.rows.front().score.common.fit_percent);
+  }
   return ranking;
 }
 

@@ -151,7 +151,8 @@ Json results_document(const Results& results) {
     document["rankings"].push_back({{"split", name(ranking.split)},
                                     {"scored_samples", ranking.scored_samples},
                                     {"common_samples", ranking.common_samples},
-                                    {"is_ranked", ranking.is_possible()}});
+                                    {"is_ranked", ranking.is_possible()},
+                                    {"best_fit_percent", json_number(ranking.best_fit_percent)}});
   document["results"] = Json::array();
   for (const ResultRow& row : results.rows) {
     const auto add = [&](const Metrics& metrics, std::string_view mode) {
@@ -165,7 +166,9 @@ Json results_document(const Results& results) {
 
 std::string results_json(const Results& results) { return json_text(results_document(results)); }
 
-std::string ranking_note(const Ranking& ranking) {
+namespace {
+
+std::string note_on_samples(const Ranking& ranking) {
   constexpr double kCannotBeIgnored = 0.1;
   if (ranking.common_samples == ranking.scored_samples) return {};
   const double guarded = ranking.guarded_share();
@@ -186,6 +189,21 @@ std::string ranking_note(const Ranking& ranking) {
   return fmt::format(
       "errors on {} of {} samples; in the others a guard reported a fault of a model\n",
       ranking.common_samples, ranking.scored_samples);
+}
+
+}  // namespace
+
+std::string ranking_note(const Ranking& ranking) {
+  std::string note;
+  if (ranking.best_fit_percent < 0.0)
+    note = fmt::format(
+        "WARNING: no model is better than the mean of the {} recordings (the best fit is {:.1f} "
+        "%).\n"
+        "The zero of the torque or of an angle differs from that of the training, or they are of "
+        "another "
+        "joint: torsio check compares the zeros.\n",
+        name(ranking.split), ranking.best_fit_percent);
+  return note + note_on_samples(ranking);
 }
 
 RankedRows ranked_rows(const Results& results, Role split) {

@@ -33,8 +33,9 @@ struct ResultRow {
 /// there are those of the linear fallback, or of a model beyond its training range.
 struct Ranking {
   Role split = Role::test;
-  std::size_t scored_samples = 0;  ///< scored by at least one of the models
-  std::size_t common_samples = 0;  ///< scored, and guarded in no ranked model
+  std::size_t scored_samples = 0;          ///< scored by at least one of the models
+  std::size_t common_samples = 0;          ///< scored, and guarded in no ranked model
+  double best_fit_percent = kNotMeasured;  ///< fit of the first model; 0: that of the mean
 
   /// Share of the scored samples that a guard excludes; NaN if none were scored.
   [[nodiscard]] double guarded_share() const noexcept {
