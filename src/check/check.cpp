@@ -20,11 +20,6 @@
 namespace torsio {
 namespace {
 
-bool has_segment(const DatasetRecord& record, Role role) {
-  return std::ranges::any_of(record.segments,
-                             [&](const Segment& segment) { return segment.role == role; });
-}
-
 /// Each thread needs copies of the channels of one recording. One, where two recordings have one name: the
 /// order of their findings would not be determined.
 std::size_t threads_for(const Dataset& dataset) {
@@ -66,6 +61,7 @@ void Checker::run_checks(bool with_warnings) {
   if (has_failed()) return;  // too short for the other checks
   check_missing();
   check_constant();
+  check_coding();
   if (with_warnings) check_saturation();
   check_frozen();
   if (with_warnings) {
@@ -133,7 +129,7 @@ void Checker::check_excitation() {
   std::vector<std::size_t> reversals_of(pairs_.size(), 0);
   std::vector<std::vector<double>> speeds_of(pairs_.size());
   for_each_record([&](std::size_t r) {
-    if (!has_segment(dataset_.records[r], Role::train)) return;
+    if (!dataset_.records[r].has_role(Role::train)) return;
     reversals_of[r] = count_reversals(pairs_[r].input);
     speeds_of[r] = typical_speeds(movement(pairs_[r].input, window));
   });

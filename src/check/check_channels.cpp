@@ -208,6 +208,7 @@ void Checker::check_frozen() {
         }
       }
     });
+    check_switched_off();
   });
 }
 
@@ -248,8 +249,10 @@ bool Checker::is_end_of_stall(std::size_t r, std::size_t sample) const {
 // The channels of the first input may have a much larger range than the input: the resolution of a
 // gear's angle is compared with the range of the deflection.
 void Checker::check_resolution() {
-  pass_unless_found("resolution", "every sensor resolves its range",
-                    [&] { for_each_record([&](std::size_t r) { check_resolution_of(r); }); });
+  pass_unless_found("resolution", "every sensor resolves its range", [&] {
+    for_each_record([&](std::size_t r) { check_resolution_of(r); });
+    check_held();
+  });
 }
 
 void Checker::check_resolution_of(std::size_t r) {

@@ -1,13 +1,61 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
+#include <string>
+#include <string_view>
 
 #include "check/checker.hpp"
 #include "data/finest_step.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
+
+namespace {
+
+/// Whether it is a channel of motion or load; others, like a temperature, change the torque at equal motion.
+bool is_motion_or_load(std::string_view channel) {
+  constexpr auto kUnits = std::to_array<std::string_view>(
+      {"rad", "rad_s", "rad_s2", "m", "m_s", "m_s2", "N", "Nm", "Nm_s", "A", "V", "s"});
+  const auto parts = split_channel_name(channel);
+  return parts && std::ranges::find(kUnits, parts->unit->si_suffix) != kUnits.end();
+}
+
+}  // namespace
+
+FeatureSpec Checker::spec_of(std::size_t input) const {
+  FeatureSpec spec = spec_;
+  spec.inputs = {spec_.inputs[input]};
+  return spec;
+}
+
+// What a temperature or a pressure explains is what a model shall learn, and no fault of a zero or a gain.
+void Checker::take_out_other_inputs() {
+  std::vector<OtherInput> others;
+  std::set<std::string> met;
+  const auto take = [&](const auto& values_of) {
+    others.emplace_back();
+    for (const DatasetRecord& record : dataset_.records)
+      others.back().values.push_back(values_of(record.recording));
+  };
+  for (std::size_t k = 1; k < spec_.inputs.size(); ++k) {
+    const FeatureSpec spec = spec_of(k);
+    const FeaturePipeline pipeline(spec, dataset_.sample_rate_Hz());
+    if (std::ranges::all_of(pipeline.raw_inputs(), is_motion_or_load)) continue;
+    met.insert(pipeline.raw_inputs().begin(), pipeline.raw_inputs().end());
+    take([&](const Recording& recording) { return first_feature(recording, spec); });
+  }
+  if (!dataset_.records.empty())
+    for (const std::string& name : dataset_.records.front().recording.conditions())
+      if (!met.contains(name) &&
+          std::ranges::all_of(dataset_.records, [&](const DatasetRecord& record) {
+            return is_condition(record.recording, name);
+          }))
+        take([&](const Recording& recording) { return recording.channel(name).values; });
+  if (!others.empty()) take_out(pairs_, others);
+}
 
 // The sensors of both sides of a spring turn by the same angle, so one of them in another unit
 // turns by a unit's factor as much; and recordings of one joint have one stiffness.
@@ -319,6 +367,7 @@ void Checker::check_change() {
 // constant nor by a factor.
 void Checker::check_offsets() {
   pass_unless_found("offsets", "the recordings have the same zero and gain", [&] {
+    check_zeros();
     std::vector<const Pair*> pairs;
     std::vector<std::size_t> records;
     double spread = 0.0;

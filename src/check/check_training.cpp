@@ -2,6 +2,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "check/checker.hpp"
 #include "fit/common/held_out.hpp"
@@ -15,6 +16,20 @@
 
 namespace torsio {
 namespace {
+
+/// Sum of the squared deviations from the mean.
+double variation(const std::vector<double>& values) {
+  double count = 0.0;
+  double mean = 0.0;
+  double squares = 0.0;
+  for (const double value : values) {
+    if (!is_finite(value)) continue;
+    const double step = value - mean;
+    mean += step / ++count;
+    squares += step * (value - mean);
+  }
+  return squares;
+}
 
 /// The clauses of an error in front of its advice.
 std::string problem_of(const Error& error) {
@@ -40,6 +55,38 @@ void Checker::check_determination(const TrainingData& data) {
                   data.target, held_out.rmse, unit_label(data.target), held_out.constant_rmse),
       "Check that inputs and target are of the same joint and time, and that the torque sensor "
       "measures.");
+}
+
+// A sensor that writes something else than its quantity can still be correlated with the motion.
+void Checker::check_explanation() {
+  const auto target = split_channel_name(dataset_.target);
+  if (!target || target->unit->si_suffix != "Nm") return;
+  std::vector<std::pair<double, double>> left_of(pairs_.size());  // squares that are left, and all
+  for_each_record([&](std::size_t r) {
+    const DatasetRecord& record = dataset_.records[r];
+    if (!record.has_role(Role::train)) return;
+    std::vector<std::vector<double>> others;
+    auto share = unexplained_share(pairs_[r], others);
+    if (share && *share > kMaxUnexplained && spec_.inputs.size() > 1) {
+      for (std::size_t k = 1; k < spec_.inputs.size(); ++k)
+        others.push_back(first_feature(record.recording, spec_of(k)));
+      share = unexplained_share(pairs_[r], others);
+    }
+    if (!share) return;
+    const double squares = variation(pairs_[r].target);
+    left_of[r] = {*share * squares, squares};
+  });
+  double left = 0.0;
+  double squares = 0.0;
+  for (const auto& [of_left, of_squares] : left_of) left += of_left, squares += of_squares;
+  if (!(left > kMaxUnexplained * squares)) return;
+  add(Verdict::fail, "training data", "",
+      fmt::format(
+          "a curve with hysteresis over {}, and the other inputs, leave {:.0f} % of {} unexplained",
+          spec_.inputs.front(), 100.0 * left / squares, dataset_.target),
+      "Plot both: something else than the torque of this joint is in the log, or an "
+      "input is missing that "
+      "it depends on.");
 }
 
 // The rules of `fit` are applied, not repeated: what it refuses is a FAIL with its own message.
@@ -74,6 +121,7 @@ void Checker::check_training() {
             "Check the freshness column of the target and the length of the recording: filters of "
             "the inputs must settle first.");
       check_determination(data.training);
+      check_explanation();
       data_ = std::move(data);
     } catch (const Error& error) {
       add(Verdict::fail, "training data", "", problem_of(error), error.report().advice);

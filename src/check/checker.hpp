@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "check/delay.hpp"
+#include "check/signal_faults.hpp"
 #include "check/signal_pair.hpp"
 #include "check/torque_relation.hpp"
 #include "torsio/check/check.hpp"
@@ -36,8 +37,10 @@ class Checker {
     pairs_.resize(dataset.records.size());
     for_each_record([&](std::size_t r) {
       const Recording& recording = dataset.records[r].recording;
-      pairs_[r] = {first_feature(recording, spec), bridged(recording.channel(dataset.target))};
+      pairs_[r] = {first_feature(recording, spec),
+                   bridged_or_held(recording.channel(dataset.target))};
     });
+    take_out_other_inputs();
     spoiled_.resize(pairs_.size());
     stalls_.resize(pairs_.size());
     flips_.resize(pairs_.size());
@@ -98,6 +101,13 @@ class Checker {
   void check_resolution_of(std::size_t r);
   void leave_out(std::size_t r, const Rest& rest);
   [[nodiscard]] bool is_end_of_stall(std::size_t r, std::size_t sample) const;
+  void check_coding();
+  void check_held();
+  void check_switched_off();
+  void check_zeros();
+  void take_out_other_inputs();
+  void check_explanation();
+  [[nodiscard]] FeatureSpec spec_of(std::size_t input) const;
   void check_resolution();
   void check_columns();
   [[nodiscard]] bool may_be_target(const Recording& recording, const Channel& channel) const;
@@ -168,6 +178,8 @@ class Checker {
   static constexpr double kSpeedHalfWindow_s = 0.05;
   static constexpr double kSpeedRatio = 2.0;
   static constexpr double kOffsetShare = 0.05;
+  static constexpr double kZeroShare = 0.02;      ///< share of the range
+  static constexpr double kMaxUnexplained = 0.5;  ///< share of the variance
   static constexpr double kGainChange = 0.12;
   static constexpr double kClearDelay_s = 0.03;
   static constexpr double kLinesLeave = 0.5;    ///< share of what one common curve does not explain
@@ -192,9 +204,9 @@ class Checker {
   FeaturePipeline pipeline_;
   std::optional<std::string> leak_;
   std::optional<LearningData> data_;
-  std::vector<std::string> channels_;  ///< raw inputs and the target
-  std::vector<std::string> sources_;   ///< channels of the first input's expression
-  std::vector<Pair> pairs_;
+  std::vector<std::string> channels_;           ///< raw inputs and the target
+  std::vector<std::string> sources_;            ///< channels of the first input's expression
+  std::vector<Pair> pairs_;                     ///< without what `take_out_other_inputs` finds
   std::vector<std::uint8_t> spoiled_;           ///< by record: its relation is known to be wrong
   std::vector<std::vector<Rest>> stalls_;       ///< by record
   std::vector<std::optional<SignFlip>> flips_;  ///< by record

@@ -12,7 +12,7 @@ namespace {
 constexpr auto kStops = std::to_array<double>({0.01, 0.04, 0.16, 0.5});  // shares of half the range
 constexpr auto kHinges = std::to_array<double>({-0.75, -0.5, -0.25, 0.25, 0.5, 0.75});
 constexpr Eigen::Index kPowers = 4;
-constexpr Eigen::Index kStatic = kPowers + static_cast<Eigen::Index>(kHinges.size());
+static_assert(kStaticColumns == kPowers + static_cast<Eigen::Index>(kHinges.size()));
 
 }  // namespace
 
@@ -21,7 +21,7 @@ Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,
   const double middle = 0.5 * (extent.lowest + extent.highest);
   const double scale = extent.width() > 0.0 ? 2.0 / extent.width() : 0.0;
   Eigen::MatrixXd columns(static_cast<Eigen::Index>(samples.size()),
-                          kStatic + static_cast<Eigen::Index>(kStops.size()));
+                          kStaticColumns + static_cast<Eigen::Index>(kStops.size()));
   std::array<double, kStops.size()> stops{};
   double last = kNotMeasured;
   std::size_t i = 0;
@@ -39,7 +39,7 @@ Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,
     for (std::size_t k = 0; k < kHinges.size(); ++k)
       columns(row, kPowers + static_cast<Eigen::Index>(k)) = std::max(z - kHinges[k], 0.0);
     for (std::size_t k = 0; k < stops.size(); ++k)
-      columns(row, kStatic + static_cast<Eigen::Index>(k)) = stops[k];
+      columns(row, kStaticColumns + static_cast<Eigen::Index>(k)) = stops[k];
   }
   return columns;
 }

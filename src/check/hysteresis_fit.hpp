@@ -21,6 +21,8 @@ namespace torsio {
 [[nodiscard]] Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,
                                                  std::span<const std::size_t> samples,
                                                  const Extent& extent);
+/// As many of them, the first ones, are the static curve.
+inline constexpr Eigen::Index kStaticColumns = 10;
 [[nodiscard]] inline Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,
                                                         std::span<const std::size_t> samples) {
   return hysteresis_columns(signal, samples, extent_of(signal));

@@ -4,9 +4,13 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
+#include <span>
 #include <unordered_map>
+#include <utility>
 
 #include "check/signal_pair.hpp"
+#include "data/finest_step.hpp"
 #include "numerics/quantile.hpp"
 
 namespace torsio {
@@ -31,6 +35,10 @@ constexpr double kFewRows = 8.0;
 constexpr double kAgree = 1.5;
 constexpr std::size_t kFewIntervals = 100;
 constexpr std::size_t kMaxBroken = 3;
+constexpr std::size_t kFewRuns = 20;
+constexpr double kLongRun = 3.0;          ///< times the usual one: the joint is at rest
+constexpr double kRunsOfOneLength = 0.9;  ///< share of the runs
+constexpr double kCodesOfAHeldStep = 3.0;
 
 /// x3 - 3 x2 + 3 x1 - x0 of four successive new samples.
 double third_difference(const Channel& channel, const std::vector<std::size_t>& samples,
@@ -266,6 +274,66 @@ std::optional<BrokenCadence> find_broken_cadence(const Channel& channel) {
     if (broken++ == 0) cadence.sample = samples[k + 1], cadence.found = intervals[k];
   }
   return broken > 0 && broken <= kMaxBroken ? std::optional(cadence) : std::nullopt;
+}
+
+std::size_t held_rows(const Channel& channel) {
+  if (!channel.fresh.empty() || channel.step_before_resampling > 0.0) return 0;
+  const std::vector<double>& values = channel.values;
+  std::vector<double> lengths;
+  std::vector<double> steps;
+  for (std::size_t begin = 0, end = 0; begin < values.size(); begin = end) {
+    while (end < values.size() && values[end] == values[begin]) ++end;
+    if (end == begin) ++end;                           // not a number
+    if (begin == 0 || end >= values.size()) continue;  // its length is not known
+    lengths.push_back(static_cast<double>(end - begin));
+    steps.push_back(std::abs(values[end] - values[begin]));
+  }
+  if (lengths.size() < kFewRuns) return 0;
+  const double usual = quantile(lengths, 0.5);
+  if (usual < 2.0) return 0;
+  std::erase_if(lengths, [&](double length) { return length > kLongRun * usual; });
+  const double slack = usual >= 4.0 ? 1.0 : 0.0;  // the clocks differ
+  const auto of_one_length = std::ranges::count_if(lengths, [&](double length) {
+    // Two equal measurements are one run.
+    return length >= usual - slack && (length <= usual + slack || length >= 2.0 * usual - slack);
+  });
+  if (static_cast<double>(of_one_length) < kRunsOfOneLength * static_cast<double>(lengths.size()))
+    return 0;
+  if (quantile(std::move(steps), 0.5) < kCodesOfAHeldStep * finest_step(values)) return 0;
+  return static_cast<std::size_t>(usual);
+}
+
+std::vector<double> bridged_or_held(const Channel& channel) {
+  if (held_rows(channel) == 0) return bridged(channel);
+  Channel marked = channel;
+  for (std::size_t i = 0; i < channel.values.size(); ++i)
+    marked.fresh.push_back(i == 0 || channel.values[i] != channel.values[i - 1] ? 1 : 0);
+  return bridged(marked);
+}
+
+double moved_within(const Channel& channel, std::size_t samples) {
+  constexpr std::size_t kQuarters = 4;
+  std::vector<double> values;
+  for (const std::size_t i : new_samples(channel))
+    if (i < samples) values.push_back(channel.values[i]);
+  if (values.size() < 2 * kQuarters) return 0.0;
+  double lowest = HUGE_VAL;
+  double highest = -HUGE_VAL;
+  double variance = 0.0;  // how much the mean of a quarter varies by noise
+  for (std::size_t k = 0; k < kQuarters; ++k) {
+    const std::span quarter = std::span(values).subspan(
+        k * values.size() / kQuarters,
+        (k + 1) * values.size() / kQuarters - k * values.size() / kQuarters);
+    const auto count = static_cast<double>(quarter.size());
+    const double mean = std::accumulate(quarter.begin(), quarter.end(), 0.0) / count;
+    lowest = std::min(lowest, mean), highest = std::max(highest, mean);
+    // From differences: the motion itself is not noise.
+    for (std::size_t i = 1; i < quarter.size(); ++i)
+      variance += 0.5 * (quarter[i] - quarter[i - 1]) * (quarter[i] - quarter[i - 1]) /
+                  (count - 1.0) / count / kQuarters;
+  }
+  constexpr double kOverNoise = 4.0;
+  return std::max(0.0, highest - lowest - kOverNoise * std::sqrt(variance));
 }
 
 }  // namespace torsio

@@ -68,4 +68,16 @@ struct BrokenCadence {
 /// not regular, or in all rows.
 [[nodiscard]] std::optional<BrokenCadence> find_broken_cadence(const Channel& channel);
 
+/// A sensor that is slower than the log, whose last value is written in every row: nearly all runs of equal values have
+/// one length, and their steps are larger than the codes of the sensor.
+/// @returns that length; 0 if there is none, or new samples are marked already
+[[nodiscard]] std::size_t held_rows(const Channel& channel);
+
+/// `bridged`, also between the new samples of a channel whose values are held without marks.
+[[nodiscard]] std::vector<double> bridged_or_held(const Channel& channel);
+
+/// By how much a channel moves through the first samples: the largest difference of the means of their quarters, less
+/// what noise explains. 0 for fewer than 8 samples.
+[[nodiscard]] double moved_within(const Channel& channel, std::size_t samples);
+
 }  // namespace torsio

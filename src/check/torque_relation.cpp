@@ -26,7 +26,13 @@ constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
 constexpr double kSlopeChange = 0.12;
 constexpr double kSmallTorqueRest = 0.01;  ///< share of the torque's variance
 constexpr std::size_t kManyReversals = 5;
-constexpr double kPartShare = 0.2;  ///< share of the input's range that each part passes through
+constexpr std::size_t kSamplesForFit = 10000;
+constexpr std::size_t kOffParts = 20;  ///< parts of a recording that are looked at
+constexpr std::size_t kMaxOff = 6;     ///< parts
+constexpr double kOffExpected = 0.2;   ///< share of the target's range
+constexpr double kOffPassed = 0.1;     ///< share of what is expected
+constexpr double kTakenOut = 0.9;      ///< share of what the curve leaves
+constexpr double kPartShare = 0.2;     ///< share of the input's range that each part passes through
 
 /// Running sums of one part of a record.
 struct Sums {
@@ -44,6 +50,28 @@ struct Sums {
 
 bool is_known(const Pair& pair, std::size_t i) {
   return is_finite(pair.input[i]) && is_finite(pair.target[i]);
+}
+
+void include_known(Extent& extent, const Pair& pair) {
+  for (std::size_t i = 0; i < pair.input.size(); ++i)
+    if (is_known(pair, i)) extent.include(pair.input[i]);
+}
+
+/// About so many samples at which input and target are known.
+std::vector<std::size_t> known_samples(const Pair& pair, std::size_t enough = kSamplesForFit) {
+  std::vector<double> known = pair.input;
+  for (std::size_t i = 0; i < known.size(); ++i)
+    if (!is_finite(pair.target[i])) known[i] = kNotMeasured;
+  return samples_for_fit(known, 0, known.size(), enough);
+}
+
+/// With a friction that depends on the load: the stops times the scaled input. Without them its two branches would be
+/// two slopes, one early and one late.
+Eigen::MatrixXd with_loaded_stops(const Eigen::MatrixXd& columns) {
+  const Eigen::Index stops = columns.cols() - kStaticColumns;
+  Eigen::MatrixXd all(columns.rows(), columns.cols() + stops);
+  all << columns, columns.rightCols(stops).array().colwise() * columns.col(1).array();
+  return all;
 }
 
 /// Extents of input and target in [begin, end).
@@ -156,14 +184,11 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
   const std::size_t reversals = count_reversals(pair.input);
   if (correlation(pair.input, pair.target) < kClearCorrelation || reversals < kFewestReversals)
     return {};
-  std::vector<double> known = pair.input;
-  for (std::size_t i = 0; i < known.size(); ++i)
-    if (!is_finite(pair.target[i])) known[i] = kNotMeasured;
-  const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
+  const std::vector<std::size_t> samples = known_samples(pair);
   if (samples.size() < kFewestSamples) return {};
   const Eigen::MatrixXd columns = hysteresis_columns(pair.input, samples);
   const Eigen::VectorXd target = at_samples(pair.target, samples);
-  const Course course(columns, target);
+  const Course course(with_loaded_stops(columns), target);
   Pair coarse;
   for (const std::size_t i : samples)
     coarse.input.push_back(pair.input[i]), coarse.target.push_back(pair.target[i]);
@@ -203,17 +228,12 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
 
 std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
   Extent extent;
-  for (const Pair* pair : pairs)
-    for (std::size_t i = 0; i < pair->input.size(); ++i)
-      if (is_known(*pair, i)) extent.include(pair->input[i]);
+  for (const Pair* pair : pairs) include_known(extent, *pair);
   std::vector<Eigen::MatrixXd> parts;
   std::vector<Eigen::VectorXd> targets;
   Eigen::Index rows = 0;
   for (const Pair* pair : pairs) {
-    std::vector<double> known = pair->input;
-    for (std::size_t i = 0; i < known.size(); ++i)
-      if (!is_finite(pair->target[i])) known[i] = kNotMeasured;
-    const auto samples = samples_for_fit(known, 0, known.size(), 10000 / pairs.size());
+    const auto samples = known_samples(*pair, kSamplesForFit / pairs.size());
     if (samples.size() < kFewestSamples) return {};
     parts.push_back(hysteresis_columns(pair->input, samples, extent));
     targets.push_back(at_samples(pair->target, samples));
@@ -252,6 +272,154 @@ std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
          .unexplained = with_lines,
          .without_lines = without_lines});
   return lines;
+}
+
+std::optional<SwitchedOff> find_switched_off(const Pair& pair) {
+  if (std::abs(correlation(pair.input, pair.target)) < kClearCorrelation) return {};
+  const std::vector<std::size_t> samples = known_samples(pair);
+  if (samples.size() < kFewestSamples) return {};
+  const FixedColumns columns(hysteresis_columns(pair.input, samples));
+  const Eigen::VectorXd target = at_samples(pair.target, samples);
+  const Eigen::VectorXd curve = target - columns.residual(target);
+  const double range = extent_of(pair.target).width();
+  struct Part {
+    double expected = 0.0;
+    double passed = 0.0;
+    bool is_off = false;
+  };
+  std::array<Part, kOffParts> parts;
+  const auto size = static_cast<std::size_t>(target.size());
+  const auto begin_of = [&](std::size_t part) { return size * part / kOffParts; };
+  for (std::size_t k = 0; k < kOffParts; ++k) {
+    const auto width = [&](const Eigen::VectorXd& values) {
+      const auto of_part = values.segment(static_cast<Eigen::Index>(begin_of(k)),
+                                          static_cast<Eigen::Index>(begin_of(k + 1) - begin_of(k)));
+      return of_part.maxCoeff() - of_part.minCoeff();
+    };
+    parts[k] = {.expected = width(curve), .passed = width(target)};
+    parts[k].is_off = parts[k].expected >= kOffExpected * range &&
+                      parts[k].passed <= kOffPassed * parts[k].expected;
+  }
+  const auto first = std::ranges::find(parts, true, &Part::is_off);
+  if (first == parts.end()) return {};
+  // As far as the target remains as quiet, also where the motion turns.
+  SwitchedOff off{.samples = {}, .passed = first->passed, .expected = first->expected};
+  std::size_t begin = static_cast<std::size_t>(first - parts.begin());
+  std::size_t end = begin + 1;
+  const auto is_quiet = [&](const Part& part) {
+    return part.passed <= kOffPassed * first->expected;
+  };
+  while (begin > 0 && is_quiet(parts[begin - 1])) --begin;
+  while (end < kOffParts && is_quiet(parts[end])) ++end;
+  const auto off_elsewhere = std::ranges::any_of(parts.begin() + static_cast<std::ptrdiff_t>(end),
+                                                 parts.end(), &Part::is_off);
+  if (end - begin > kMaxOff || off_elsewhere) return {};
+  for (std::size_t k = begin; k < end; ++k) {
+    off.passed = std::max(off.passed, parts[k].passed);
+    off.expected = std::max(off.expected, parts[k].expected);
+  }
+  off.samples = {.begin = samples[begin_of(begin)],
+                 .end = end < kOffParts ? samples[begin_of(end)] : pair.target.size()};
+  return off;
+}
+
+void take_out(std::span<Pair> pairs, std::span<const OtherInput> others) {
+  Extent extent;
+  for (const Pair& pair : pairs) include_known(extent, pair);
+  std::vector<Extent> ranges;
+  std::vector<bool> has_square;
+  for (const OtherInput& other : others) {
+    Extent range;
+    std::vector<double> levels;
+    for (const std::vector<double>& values : other.values)
+      for (const double value : values) {
+        range.include(value);
+        if (is_finite(value) && levels.size() < kFewestLevels &&
+            std::ranges::find(levels, value) == levels.end())
+          levels.push_back(value);
+      }
+    ranges.push_back(range);
+    has_square.push_back(levels.size() >= kFewestLevels);
+  }
+  const double middle = 0.5 * (extent.lowest + extent.highest);
+  const double scale = extent.width() > 0.0 ? 2.0 / extent.width() : 0.0;
+  const auto terms = static_cast<Eigen::Index>(3 * others.size());
+  const auto terms_at = [&](std::size_t r, std::size_t sample) {
+    Eigen::RowVectorXd row(terms);
+    const double x = scale * (pairs[r].input[sample] - middle);
+    for (std::size_t k = 0; k < others.size(); ++k) {
+      const double width = ranges[k].width();
+      const double z = width > 0.0 ? (others[k].values[r][sample] - ranges[k].lowest) / width : 0.0;
+      const auto first = static_cast<Eigen::Index>(3 * k);
+      row(first) = z;
+      row(first + 1) = x * z;
+      row(first + 2) = has_square[k] ? z * z : 0.0;
+    }
+    return row;
+  };
+  std::vector<Eigen::MatrixXd> curves;
+  std::vector<Eigen::MatrixXd> effects;
+  std::vector<Eigen::VectorXd> targets;
+  Eigen::Index rows = 0;
+  for (std::size_t r = 0; r < pairs.size(); ++r) {
+    Pair usable = pairs[r];
+    for (std::size_t i = 0; i < usable.input.size(); ++i)
+      if (!terms_at(r, i).allFinite()) usable.input[i] = kNotMeasured;
+    const auto samples =
+        known_samples(usable, std::max(kSamplesForFit / pairs.size(), kFewestSamples));
+    if (samples.empty()) continue;
+    curves.push_back(hysteresis_columns(pairs[r].input, samples, extent));
+    effects.emplace_back(static_cast<Eigen::Index>(samples.size()), terms);
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      effects.back().row(static_cast<Eigen::Index>(i)) = terms_at(r, samples[i]);
+    targets.push_back(at_samples(pairs[r].target, samples));
+    rows += curves.back().rows();
+  }
+  if (rows < static_cast<Eigen::Index>(kFewestSamples)) return;
+  Eigen::MatrixXd curve(rows, curves.front().cols());
+  Eigen::MatrixXd effect(rows, terms);
+  Eigen::VectorXd target(rows);
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < curves.size(); ++k) {
+    curve.middleRows(row, curves[k].rows()) = curves[k];
+    effect.middleRows(row, curves[k].rows()) = effects[k];
+    target.segment(row, curves[k].rows()) = targets[k];
+    row += curves[k].rows();
+  }
+  const FixedColumns columns(curve);
+  const Eigen::VectorXd rest = columns.residual(target);
+  Eigen::MatrixXd beyond(rows, terms);
+  for (Eigen::Index k = 0; k < terms; ++k) beyond.col(k) = columns.residual(effect.col(k));
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(beyond);
+  qr.setThreshold(1e-6);
+  const Eigen::VectorXd coefficients = qr.solve(rest);
+  if (!((rest - beyond * coefficients).squaredNorm() <= kTakenOut * rest.squaredNorm())) return;
+  for (std::size_t r = 0; r < pairs.size(); ++r)
+    for (std::size_t i = 0; i < pairs[r].target.size(); ++i)
+      if (const double explained = terms_at(r, i) * coefficients; is_finite(explained))
+        pairs[r].target[i] -= explained;
+}
+
+std::optional<double> unexplained_share(const Pair& pair,
+                                        std::span<const std::vector<double>> others) {
+  Pair usable = pair;
+  for (const std::vector<double>& other : others)
+    for (std::size_t i = 0; i < usable.input.size(); ++i)
+      if (!is_finite(other[i])) usable.input[i] = kNotMeasured;
+  const std::vector<std::size_t> samples = known_samples(usable);
+  if (samples.size() < kFewestSamples) return {};
+  const Eigen::MatrixXd curve = hysteresis_columns(pair.input, samples);
+  const auto more = static_cast<Eigen::Index>(others.size());
+  Eigen::MatrixXd columns(curve.rows(), curve.cols() + 2 * more);
+  columns.leftCols(curve.cols()) = curve;
+  for (Eigen::Index k = 0; k < more; ++k) {
+    Eigen::VectorXd values = at_samples(others[static_cast<std::size_t>(k)], samples);
+    values.array() -= values.mean();
+    if (const double largest = values.cwiseAbs().maxCoeff(); largest > 0.0) values /= largest;
+    columns.col(curve.cols() + 2 * k) = values;
+    columns.col(curve.cols() + 2 * k + 1) = values.cwiseAbs();
+  }
+  return FixedColumns(columns).unexplained(at_samples(pair.target, samples));
 }
 
 std::string_view unit_mistake(double ratio) {

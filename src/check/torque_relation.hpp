@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -41,6 +42,17 @@ struct RelationChange {
 /// the motion does not reverse on both sides of the step.
 [[nodiscard]] std::optional<RelationChange> find_relation_change(const Pair& pair);
 
+/// A part of a recording in which the target hardly changes, although it follows the input elsewhere.
+struct SwitchedOff {
+  Rest samples;
+  double passed = 0.0;    ///< range that the target passes through in it
+  double expected = 0.0;  ///< what the curve of the whole recording passes through
+};
+/// The recording is divided into twenty parts; in one the target passes through less than a tenth of what the curve with
+/// hysteresis passes through, and that is at least a fifth of the range of the target. The neighbours in which it is as
+/// quiet belong to it. Empty if these are more than six, or if it happens elsewhere, too: then it is a backlash.
+[[nodiscard]] std::optional<SwitchedOff> find_switched_off(const Pair& pair);
+
 /// Offset and slope of the torque of each recording at common inputs: all recordings are fitted by
 /// one static curve with hysteresis, and by an offset and a slope for each.
 struct RecordLine {
@@ -50,6 +62,21 @@ struct RecordLine {
   double without_lines = 1.0;  ///< the same for the common curve alone
 };
 [[nodiscard]] std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs);
+
+/// A quantity besides motion and load that can change the torque: a temperature, a pressure.
+struct OtherInput {
+  std::vector<std::vector<double>> values;  ///< one for each recording, at every sample
+};
+/// Takes out of the targets what other inputs z explain: all recordings are fitted by one static curve with hysteresis
+/// over the first input x and by z, x z and, if z has at least `kFewestLevels` values, z^2. Nothing is taken out unless
+/// they reduce what remains of the curve's residual to nine tenths.
+void take_out(std::span<Pair> pairs, std::span<const OtherInput> others);
+inline constexpr std::size_t kFewestLevels = 5;
+
+/// Share of the variance of the target that is explained neither by a curve with hysteresis over the input nor by a line
+/// over the other inputs and their magnitudes; empty for too few samples.
+[[nodiscard]] std::optional<double> unexplained_share(const Pair& pair,
+                                                      std::span<const std::vector<double>> others);
 
 /// The unit mistake that makes a number `ratio` (or 1 / `ratio`) times too large, within 10 %;
 /// empty if none does.

@@ -1,0 +1,160 @@
+// Sensors that write something else than their quantity: coded numbers, held values, a torque that is switched off.
+#include <cmath>
+#include <string>
+
+#include "check/check_support.hpp"
+#include "torsio/data/mapping.hpp"
+
+namespace torsio {
+namespace {
+
+using test::alone;
+using test::bench_recording;
+using test::changed;
+using test::findings_of;
+using test::first_of;
+using test::text_of;
+using test::verdict_of;
+
+constexpr double kCode_Nm = 0.02;
+
+/// The torque in whole codes, each made another number.
+Recording coded(const std::function<double(double)>& code) {
+  return changed(bench_recording("coded"), [&](Channel& channel) {
+    if (channel.name != "torque_Nm") return;
+    for (double& value : channel.values) value = kCode_Nm * code(std::round(value / kCode_Nm));
+  });
+}
+
+TEST(CheckSensors, NameSignedNumbersThatWereReadAsUnsigned) {
+  const auto findings =
+      findings_of(alone(coded([](double n) { return n < 0.0 ? n + 65536.0 : n; })));
+  ASSERT_EQ(verdict_of(findings, "coding"), Verdict::fail) << text_of(findings);
+  const Finding& found = first_of(findings, "coding");
+  EXPECT_NE(found.message.find("65536 of its steps"), std::string::npos) << found.message;
+  EXPECT_NE(found.advice.find("modulus: 1310.72"), std::string::npos) << found.advice;
+}
+
+TEST(CheckSensors, NameASignBit) {
+  const auto findings =
+      findings_of(alone(coded([](double n) { return n < 0.0 ? 1024.0 - n : n; })));
+  ASSERT_EQ(verdict_of(findings, "coding"), Verdict::fail) << text_of(findings);
+  const Finding& found = first_of(findings, "coding");
+  EXPECT_NE(found.message.find("1024 of its steps"), std::string::npos) << found.message;
+  EXPECT_NE(found.advice.find("sign_bit: 20.48"), std::string::npos) << found.advice;
+}
+
+TEST(CheckSensors, NameAnAngleThatBeginsAgainAfterATurn) {
+  const auto findings = findings_of(alone(changed(bench_recording("turns"), [](Channel& channel) {
+    if (channel.name == "torque_Nm") return;
+    for (double& value : channel.values) {
+      const double turned = value + 6.0;  // joint and gear pass through a whole turn
+      value = turned - 2.0 * M_PI * std::floor(turned / (2.0 * M_PI));
+    }
+  })));
+  ASSERT_EQ(verdict_of(findings, "coding"), Verdict::fail) << text_of(findings);
+  EXPECT_NE(first_of(findings, "coding").advice.find("unwrap: 6.28318531"), std::string::npos)
+      << first_of(findings, "coding").advice;
+}
+
+TEST(CheckSensors, RecogniseASensorThatIsHeldInAFasterLog) {
+  const auto held = [](bool is_marked) {
+    return alone(changed(bench_recording("held"), [is_marked](Channel& channel) {
+      if (channel.name != "torque_Nm") return;
+      for (std::size_t n = 0; n < channel.values.size(); ++n) {
+        if (is_marked) channel.fresh.push_back(n % 20 == 0 ? 1 : 0);
+        if (n % 20 != 0) channel.values[n] = channel.values[n - 1];
+      }
+    }));
+  };
+  const auto findings = findings_of(held(false));
+  EXPECT_EQ(verdict_of(findings, "delay"), Verdict::pass) << text_of(findings);
+  ASSERT_EQ(verdict_of(findings, "resolution"), Verdict::warn) << text_of(findings);
+  EXPECT_NE(first_of(findings, "resolution").message.find("a sensor of 50 Hz"), std::string::npos);
+  EXPECT_NE(first_of(findings, "resolution").advice.find("hold: [torque_Nm]"), std::string::npos);
+  EXPECT_EQ(verdict_of(findings_of(held(true)), "resolution"), Verdict::pass);
+}
+
+TEST(CheckSensors, FindATorqueThatIsSwitchedOffBeforeTheEnd) {
+  const auto findings = findings_of(alone(changed(bench_recording("off"), [](Channel& channel) {
+    if (channel.name != "torque_Nm") return;
+    for (std::size_t n = 3500; n < channel.values.size(); ++n)
+      channel.values[n] = 0.01 * std::sin(1e3 * static_cast<double>(n));
+  })));
+  ASSERT_EQ(verdict_of(findings, "frozen sensors"), Verdict::fail) << text_of(findings);
+  const Finding& found = first_of(findings, "frozen sensors");
+  EXPECT_NE(found.message.find("to the end"), std::string::npos) << found.message;
+  // The advice is a line of a mapping.
+  EXPECT_NO_THROW((void)parse_mapping(found.advice.substr(found.advice.find("to: ")), "advice"));
+}
+
+TEST(CheckSensors, WarnWhereTheZeroIsTakenInMotion) {
+  const auto zeroed_in = [](double first_s) {
+    Recording recording = bench_recording("zero");
+    recording.zeros = {{.channel = "torque_Nm", .first_s = first_s}};
+    return verdict_of(findings_of(alone(recording)), "offsets");
+  };
+  EXPECT_EQ(zeroed_in(0.2), Verdict::warn);
+  EXPECT_EQ(zeroed_in(0.008), Verdict::pass);  // too short for a motion beyond the noise
+}
+
+TEST(CheckSensors, TakeATemperatureForWhatItIs) {
+  Dataset dataset;
+  for (const double temperature_degC : {20.0, 40.0, 60.0}) {
+    Recording recording =
+        changed(bench_recording("at_" + std::to_string(temperature_degC)), [&](Channel& channel) {
+          if (channel.name == "torque_Nm")
+            for (double& value : channel.values) value += 1.5 * (temperature_degC - 20.0);
+        });
+    Channel temperature{"case_K", std::vector<double>(recording.size())};
+    for (std::size_t n = 0; n < recording.size(); ++n)
+      temperature.values[n] = temperature_degC + 0.1 * std::sin(0.01 * static_cast<double>(n));
+    recording.add(std::move(temperature));
+    dataset.records.push_back(alone(std::move(recording)).records.front());
+  }
+  dataset.target = "torque_Nm";
+  const auto without =
+      findings_of(dataset, resolve_inputs(dataset, {"gear_angle_rad - joint_angle_rad"}));
+  EXPECT_NE(verdict_of(without, "offsets"), Verdict::pass) << text_of(without);
+  const auto with =
+      findings_of(dataset, resolve_inputs(dataset, {"gear_angle_rad - joint_angle_rad", "case_K"}));
+  EXPECT_EQ(verdict_of(with, "offsets"), Verdict::pass) << text_of(with);
+}
+
+TEST(CheckSensors, FailWhereTheInputsExplainLittle) {
+  const auto findings = findings_of(alone(changed(bench_recording("folded"), [](Channel& channel) {
+    if (channel.name == "torque_Nm")
+      for (std::size_t n = 0; n < channel.values.size(); ++n)
+        channel.values[n] += 40.0 * std::sin(0.05 * static_cast<double>(n));
+  })));
+  ASSERT_EQ(verdict_of(findings, "training data"), Verdict::fail) << text_of(findings);
+}
+
+/// Friction that grows with the load: 20 Nm/rad loading and 33 unloading, the same in each cycle.
+TEST(CheckSensors, DoNotTakeALoadDependentFrictionForAChange) {
+  for (const double cycles : {1.0, 2.0, 3.0, 5.0}) {
+    Recording recording("loaded", 100.0);
+    Channel deflection{"spring_deflection_rad", {}};
+    Channel torque{"torque_Nm", {}};
+    Random random(7);
+    const auto samples = static_cast<std::size_t>(4000.0 * cycles);
+    double last = 0.0;
+    for (std::size_t n = 0; n < samples; ++n) {
+      const double phase = 2.0 * M_PI * static_cast<double>(n) / 4000.0;
+      const double x = 0.5 * std::sin(phase);
+      const double direction = std::tanh((x - last) / 1e-4);
+      last = x;
+      const double spring_Nm = 26.0 * x;
+      deflection.values.push_back(x);
+      torque.values.push_back(spring_Nm + 0.25 * std::abs(spring_Nm) * direction +
+                              0.05 * random.normal());
+    }
+    recording.add(std::move(deflection));
+    recording.add(std::move(torque));
+    const auto findings = findings_of(alone(recording));
+    EXPECT_EQ(verdict_of(findings, "change"), Verdict::pass) << cycles << ": " << text_of(findings);
+  }
+}
+
+}  // namespace
+}  // namespace torsio
