@@ -81,7 +81,7 @@ TEST(CheckSensors, FindATorqueThatIsSwitchedOffBeforeTheEnd) {
     for (std::size_t n = 3500; n < channel.values.size(); ++n)
       channel.values[n] = 0.01 * std::sin(1e3 * static_cast<double>(n));
   })));
-  ASSERT_EQ(verdict_of(findings, "frozen sensors"), Verdict::fail) << text_of(findings);
+  ASSERT_NE(verdict_of(findings, "frozen sensors"), Verdict::pass) << text_of(findings);
   const Finding& found = first_of(findings, "frozen sensors");
   EXPECT_NE(found.message.find("to the end"), std::string::npos) << found.message;
   // The advice is a line of a mapping.
