@@ -11,6 +11,7 @@
 
 #include "check/signal_pair.hpp"
 #include "data/finest_step.hpp"
+#include "data/marks_of_changes.hpp"
 #include "numerics/quantile.hpp"
 
 namespace torsio {
@@ -306,8 +307,7 @@ std::size_t held_rows(const Channel& channel) {
 std::vector<double> bridged_or_held(const Channel& channel) {
   if (held_rows(channel) == 0) return bridged(channel);
   Channel marked = channel;
-  for (std::size_t i = 0; i < channel.values.size(); ++i)
-    marked.fresh.push_back(i == 0 || channel.values[i] != channel.values[i - 1] ? 1 : 0);
+  marked.fresh = marks_of_changes(channel.values);
   return bridged(marked);
 }
 

@@ -5,17 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 
-#include "data/finest_step.hpp"
 #include "data/inspect_clock.hpp"
-#include "data/interpolate.hpp"
 #include "data/log_table.hpp"
 #include "data/mapping/column_advice.hpp"
 #include "data/names.hpp"
-#include "data/resample.hpp"
 #include "numerics/quantile.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -182,50 +180,56 @@ void refuse_lost(const Stamps& stamps) {
                                                       clock_line(stamps, resample_entry(stamps))});
 }
 
-/// What a number of the clock's column is in seconds.
-double clock_factor(const Stamps& stamps) {
+/// A counter that overflows.
+struct Overflow {
+  int bits = 0;
+  double tick_s = 0.0;
+  double span_s = 0.0;
+};
+
+/// The counter that goes back by so much where it begins again.
+std::optional<Overflow> find_overflow(double back_s, double step_s) {
+  constexpr double kNear = 2.0;  // intervals
+  for (const int bits : {16, 24, 31, 32})
+    for (const double tick_s : {1.0, 1e-3, 1e-6, 1e-9})
+      if (const double span_s = std::exp2(bits) * tick_s;
+          std::abs(back_s + step_s - span_s) <= kNear * step_s)
+        return Overflow{.bits = bits, .tick_s = tick_s, .span_s = span_s};
+  return std::nullopt;
+}
+
+/// The mapping line that unwraps the clock.
+std::string unwrap_advice(const Stamps& stamps, double span_s) {
+  const auto line = [&](double factor) { return fmt::format("unwrap: {:.10g}", span_s / factor); };
   const auto& rules = stamps.mapping.channels;
-  if (const auto rule = std::ranges::find(rules, stamps.column.name, &ChannelRule::from);
-      rule != rules.end())
-    return column_factor(*rule, stamps.column).value_or(1.0);
+  const auto rule = std::ranges::find(rules, stamps.column.name, &ChannelRule::from);
+  if (rule != rules.end())
+    return fmt::format("Mapping: add  {}  to the rule of {}.",
+                       line(column_factor(*rule, stamps.column).value_or(1.0)), rule->name);
   const auto parts = split_channel_name(stamps.column.full_name());
-  return parts ? parts->unit->scale : 1.0;
+  return fmt::format("Mapping: channels: {{t_s: {{from: {}, {}}}}}", stamps.column.name,
+                     line(parts ? parts->unit->scale : 1.0));
 }
 
 /// A counter of the logger that overflows, or a second log after the first one.
 void refuse_new_beginning(const Stamps& stamps) {
-  constexpr double kNear = 2.0;  // intervals
   const double step_s = stamps.report.stamp_step_s;
   if (!(step_s > 0.0)) return;
   for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
     const double back_s = stamps.values_s[i - 1] - stamps.values_s[i];
     if (!(back_s > kLongestGapIntervals * step_s)) continue;
-    const double factor = clock_factor(stamps);
-    for (const int bits : {16, 24, 31, 32}) {
-      for (const double tick_s : {1.0, 1e-3, 1e-6, 1e-9}) {
-        const double span_s = std::exp2(bits) * tick_s;
-        if (std::abs(back_s + step_s - span_s) > kNear * step_s) continue;
-        const auto rule =
-            std::ranges::find(stamps.mapping.channels, stamps.column.name, &ChannelRule::from);
-        const std::string span = fmt::format("unwrap: {:.10g}", span_s / factor);
-        throw ClockError(
-            {.place = stamps.place(i),
-             .problem = fmt::format("the clock begins again after 2^{} of its ticks of {:g} s",
-                                    bits, tick_s),
-             .expected = fmt::format("more than {} s", stamps.values_s[i - 1]),
-             .found = fmt::format("{} s", stamps.values_s[i]),
-             .advice = rule != stamps.mapping.channels.end()
-                           ? fmt::format("Mapping: add  {}  to the rule of {}.", span, rule->name)
-                           : fmt::format("Mapping: channels: {{t_s: {{from: {}, {}}}}}",
-                                         stamps.column.name, span)});
-      }
-    }
-    throw ClockError({.place = stamps.place(i),
-                      .problem = "the clock starts again, as if two logs were in one file",
-                      .expected = fmt::format("more than {} s", stamps.values_s[i - 1]),
-                      .found = fmt::format("{} s", stamps.values_s[i]),
-                      .advice = fmt::format("Make a recording of each part, in a mapping:  {}",
-                                            clock_line(stamps, "", usual_limit_s(stamps)))});
+    const auto overflow = find_overflow(back_s, step_s);
+    throw ClockError(
+        {.place = stamps.place(i),
+         .problem = overflow
+                        ? fmt::format("the clock begins again after 2^{} of its ticks of {:g} s",
+                                      overflow->bits, overflow->tick_s)
+                        : "the clock starts again, as if two logs were in one file",
+         .expected = fmt::format("more than {} s", stamps.values_s[i - 1]),
+         .found = fmt::format("{} s", stamps.values_s[i]),
+         .advice = overflow ? unwrap_advice(stamps, overflow->span_s)
+                            : fmt::format("Make a recording of each part, in a mapping:  {}",
+                                          clock_line(stamps, "", usual_limit_s(stamps)))});
   }
 }
 
@@ -390,68 +394,6 @@ RecordClock record_clock(const LogTable& table, const TableChannels& columns, Ro
     clock.sample_rate_Hz = even_rate(stamps);
   }
   return clock;
-}
-
-std::vector<Rows> parts_between_gaps(std::span<const double> stamps_s, Rows rows, double gap_s) {
-  constexpr std::size_t kFewest = 2;  // have a rate
-  std::vector<Rows> parts;
-  for (std::size_t begin = rows.begin, end = begin; begin < rows.end; begin = end) {
-    do ++end;
-    while (end < rows.end && stamps_s[end] >= stamps_s[end - 1] &&
-           stamps_s[end] - stamps_s[end - 1] <= gap_s);
-    if (const Rows part{.begin = begin, .end = end}; part.size() >= kFewest) parts.push_back(part);
-  }
-  return parts;
-}
-
-Rows rows_between(const TableChannels& columns, std::size_t rows, const Mapping& mapping,
-                  double rate_Hz) {
-  const double rate = mapping.rate_Hz > 0.0 ? mapping.rate_Hz : rate_Hz;
-  const auto time_s = [&](std::size_t row) {
-    if (!columns.clock) return static_cast<double>(row) / rate;
-    const std::vector<double>& stamps_s = columns.clock->channel.values;
-    return stamps_s[row] - stamps_s.front();
-  };
-  Rows used{.begin = 0, .end = rows};
-  if (mapping.from_s > 0.0)
-    while (used.begin < rows && !(time_s(used.begin) >= mapping.from_s)) ++used.begin;
-  if (std::isfinite(mapping.to_s)) {
-    used.end = used.begin;
-    while (used.end < rows && time_s(used.end) <= mapping.to_s) ++used.end;
-  }
-  return used;
-}
-
-std::vector<double> spread_within_stamps(std::span<const double> stamps) {
-  std::vector<double> spread(stamps.begin(), stamps.end());
-  double interval = 0.0;
-  for (std::size_t begin = 0, end = 0; begin < spread.size(); begin = end) {
-    while (end < spread.size() && stamps[end] == stamps[begin]) ++end;
-    if (end < spread.size())
-      interval = (stamps[end] - stamps[begin]) / static_cast<double>(end - begin);
-    for (std::size_t i = begin; i < end; ++i)
-      spread[i] = stamps[begin] + static_cast<double>(i - begin) * interval;
-  }
-  return spread;
-}
-
-Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
-                      double sample_rate_Hz, std::size_t samples) {
-  Channel even{.name = channel.name, .values = {}, .step_before_resampling = finest_step(channel)};
-  if (channel.fresh.empty()) {
-    even.values = interpolate(stamps_s, channel.values, sample_rate_Hz, samples);
-    return even;
-  }
-  even.values.resize(samples);
-  even.fresh.assign(samples, 0);
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < samples; ++i) {
-    const double time = stamps_s.front() + static_cast<double>(i) / sample_rate_Hz;
-    for (; next < stamps_s.size() && stamps_s[next] <= time; ++next)
-      if (channel.fresh[next] != 0) even.fresh[i] = 1;
-    even.values[i] = channel.values[std::max<std::size_t>(next, 1) - 1];
-  }
-  return even;
 }
 
 }  // namespace torsio

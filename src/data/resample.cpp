@@ -122,4 +122,36 @@ std::vector<double> interpolate(std::span<const double> stamps, std::span<const 
   return even;
 }
 
+std::vector<double> spread_within_stamps(std::span<const double> stamps) {
+  std::vector<double> spread(stamps.begin(), stamps.end());
+  double interval = 0.0;
+  for (std::size_t begin = 0, end = 0; begin < spread.size(); begin = end) {
+    while (end < spread.size() && stamps[end] == stamps[begin]) ++end;
+    if (end < spread.size())
+      interval = (stamps[end] - stamps[begin]) / static_cast<double>(end - begin);
+    for (std::size_t i = begin; i < end; ++i)
+      spread[i] = stamps[begin] + static_cast<double>(i - begin) * interval;
+  }
+  return spread;
+}
+
+Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
+                      double sample_rate_Hz, std::size_t samples) {
+  Channel even{.name = channel.name, .values = {}, .step_before_resampling = finest_step(channel)};
+  if (channel.fresh.empty()) {
+    even.values = interpolate(stamps_s, channel.values, sample_rate_Hz, samples);
+    return even;
+  }
+  even.values.resize(samples);
+  even.fresh.assign(samples, 0);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double time = stamps_s.front() + static_cast<double>(i) / sample_rate_Hz;
+    for (; next < stamps_s.size() && stamps_s[next] <= time; ++next)
+      if (channel.fresh[next] != 0) even.fresh[i] = 1;
+    even.values[i] = channel.values[std::max<std::size_t>(next, 1) - 1];
+  }
+  return even;
+}
+
 }  // namespace torsio

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
+#include <vector>
+
 #include "torsio/data/recording.hpp"
 
 namespace torsio {
@@ -14,5 +18,14 @@ namespace torsio {
 /// before. NaN makes every sample NaN that is computed from it.
 /// @throws Error if the rate is not positive and finite, or would give no or too many samples.
 [[nodiscard]] Recording resample(const Recording& recording, double sample_rate_Hz);
+
+/// Samples that share a stamp, spread evenly up to the next stamp (the last ones as those before),
+/// so that stamps coarser than the sampling give a time for each sample.
+[[nodiscard]] std::vector<double> spread_within_stamps(std::span<const double> stamps_s);
+
+/// Puts a channel of uneven stamps onto an even clock of so many samples: interpolated, or held if
+/// it has a mask.
+[[nodiscard]] Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
+                                    double sample_rate_Hz, std::size_t samples);
 
 }  // namespace torsio

@@ -4,7 +4,6 @@
 #include <numbers>
 
 #include "check/check_support.hpp"
-#include "data/record_clock.hpp"
 #include "data/resample.hpp"
 #include "torsio/core/random.hpp"
 

@@ -11,8 +11,10 @@
 #include "data/csv/csv_table.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
+#include "data/marks_of_changes.hpp"
 #include "data/names.hpp"
 #include "data/record_clock.hpp"
+#include "data/resample.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/estimate.hpp"
@@ -126,14 +128,15 @@ Channel& channel_of_rule(std::vector<Channel>& channels, const std::string& name
 
 /// New samples are those with a value, or in a log that has one in every row, those whose value changes.
 void hold(Channel& channel) {
+  if (std::ranges::none_of(channel.values, [](double value) { return std::isnan(value); })) {
+    channel.fresh = marks_of_changes(channel.values);
+    return;
+  }
   channel.fresh.resize(channel.values.size());
-  const bool is_held_already =
-      std::ranges::none_of(channel.values, [](double value) { return std::isnan(value); });
   double last = kNotMeasured;
   for (std::size_t i = 0; i < channel.values.size(); ++i) {
-    const double value = channel.values[i];
-    channel.fresh[i] = std::isnan(value) || (is_held_already && value == last) ? 0 : 1;
-    if (channel.fresh[i] != 0) last = value;
+    channel.fresh[i] = std::isnan(channel.values[i]) ? 0 : 1;
+    if (channel.fresh[i] != 0) last = channel.values[i];
     channel.values[i] = last;
   }
 }
