@@ -56,14 +56,17 @@ void check_nothing_left(const Safetensors& contents, std::string_view place,
 }
 
 /// Clocks that differ by less are one: a recording's rate is measured.
-constexpr double kSameRate = 1e-3;
+bool is_same_rate(double rate_Hz, double own_Hz) {
+  constexpr double kSameRate = 1e-3;
+  return std::abs(rate_Hz - own_Hz) <= kSameRate * own_Hz;
+}
 
 /// A discrete model runs at the rate that it was trained at; a static one runs at any.
 void check_sample_rate(const AnyModel& model, double rate_Hz) {
   const double period_s = model.sample_period();
   if (model.is_rediscretised() || !(period_s > 0.0)) return;
   const double own_Hz = 1.0 / period_s;
-  if (std::abs(rate_Hz - own_Hz) <= kSameRate * own_Hz) return;
+  if (is_same_rate(rate_Hz, own_Hz)) return;
   throw Error(
       {.place = "sample rate",
        .expected = fmt::format("{:.6g} Hz, at which the {} was trained", own_Hz, model.family()),
@@ -154,7 +157,7 @@ Estimator make_estimator(const ModelFile& model, double sample_rate_Hz) {
   for (double& step : resampled.settings.disturbances.largest_step) step *= longer;
   resampled.settings.disturbances.largest_travel *= longer;
   const double own_Hz = model.settings.sample_rate_Hz;
-  if (own_Hz > 0.0 && std::abs(sample_rate_Hz - own_Hz) > kSameRate * own_Hz)
+  if (own_Hz > 0.0 && sample_rate_Hz > 0.0 && !is_same_rate(sample_rate_Hz, own_Hz))
     resampled.settings.features = at_sample_rate(model.settings.features, own_Hz, sample_rate_Hz);
   resampled.settings.sample_rate_Hz = sample_rate_Hz;
   return make_estimator(resampled);

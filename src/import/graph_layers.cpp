@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/lower.hpp"
 #include "files/safetensors.hpp"
 #include "import/graph_evaluator.hpp"
 
@@ -182,11 +183,7 @@ Value Evaluator::magnitude(const Node& node) { return Magnitude{signal(node, 0)}
 Value Evaluator::activation(const Node& node) {
   if (node.op == "Elu" && number(node, "alpha", 1.0) != 1.0)
     refuse(graph_, node, "alpha 1", fmt::format("{}", number(node, "alpha", 1.0)));
-  std::string name = node.op;
-  std::ranges::transform(name, name.begin(), [](unsigned char letter) {
-    return static_cast<char>(std::tolower(letter));
-  });
-  return appended(node, signal(node, 0), ActivationStage{activation_of(name)});
+  return appended(node, signal(node, 0), ActivationStage{activation_of(lower(node.op))});
 }
 
 void Evaluator::check_recurrent(const Node& node) const {

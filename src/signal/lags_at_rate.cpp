@@ -1,26 +1,19 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "core/text_cursor.hpp"
+#include "core/trimmed.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
 namespace {
-
-bool is_of_name(char c) {
-  return c == '_' || (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
-
-std::string_view trimmed(std::string_view text) {
-  const auto begin = text.find_first_not_of(" \t");
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
-}
 
 /// Rewrites the numbers of samples in an expression that a pipeline has accepted.
 class LagWriter {
@@ -30,12 +23,12 @@ class LagWriter {
   [[nodiscard]] std::string rewritten(std::string_view text) const {
     std::string result;
     for (std::size_t i = 0; i < text.size();) {
-      if (!is_of_name(text[i])) {
+      if (!is_word_character(text[i])) {
         result += text[i++];
         continue;
       }
       std::size_t end = i;
-      while (end < text.size() && is_of_name(text[end])) ++end;
+      while (end < text.size() && is_word_character(text[end])) ++end;
       const std::string_view name = text.substr(i, end - i);
       result += name;
       i = end;

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string>
 #include <string_view>
+
+#include "core/lower.hpp"
 
 namespace torsio {
 
@@ -16,11 +17,9 @@ namespace torsio {
       "<na>",  "nat",   "null",   "(null)",  "none",    "nil",      "empty",
       "-",     "--",    "---",    "?",       "\\n",     "missing",  "undefined",
       "undef", "#num!", "#null!", "#value!", "#div/0!", "#ref!",    "1.#nan"};
-  std::string lower(cell);
-  std::ranges::transform(lower, lower.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (std::ranges::find(kMarks, lower) != kMarks.end()) return true;
-  std::string_view text = lower;
+  const std::string small = lower(cell);
+  if (std::ranges::find(kMarks, small) != kMarks.end()) return true;
+  std::string_view text = small;
   if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
   return text == "nan" || text.starts_with("nan(") || text.starts_with("1.#qnan") ||
          text.starts_with("1.#snan") || text.starts_with("1.#ind");

@@ -7,6 +7,7 @@
 #include <ctime>
 #include <vector>
 
+#include "core/text_cursor.hpp"
 #include "core/trimmed.hpp"
 
 namespace torsio {
@@ -16,8 +17,7 @@ constexpr double kDay_s = 86400.0;
 constexpr double kHour_s = 3600.0;
 constexpr double kMinute_s = 60.0;
 
-bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
-bool is_letter(char c) noexcept { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
+bool is_latin_letter(char c) noexcept { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
 
 /// Whether a word is the English name of a month, or its first three letters.
 bool is_month(std::string_view word) {
@@ -34,7 +34,7 @@ bool is_month(std::string_view word) {
 
 /// The letters, or the digits, at the beginning of a text; its first character if that is neither.
 std::string_view first_part(std::string_view text) noexcept {
-  const auto same = is_digit(text.front()) ? is_digit : is_letter;
+  const auto same = is_digit(text.front()) ? is_digit : is_latin_letter;
   const auto* const end = std::ranges::find_if_not(text, same);
   return text.substr(0, std::max<std::size_t>(static_cast<std::size_t>(end - text.begin()), 1));
 }
@@ -301,7 +301,7 @@ std::string likely_time_format(std::string_view text) {
     left.remove_prefix(part.size());
     if (is_month(part)) {
       format += "%b";
-    } else if (is_letter(part.front()) && part.size() >= 2) {
+    } else if (is_latin_letter(part.front()) && part.size() >= 2) {
       format += has_halves && left.empty() ? "%p" : "%a";
     } else if (!is_digit(part.front())) {
       format += part;  // a mark between the parts

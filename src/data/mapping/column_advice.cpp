@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 
+#include "core/lower.hpp"
 #include "core/trimmed.hpp"
 #include "data/names.hpp"
 #include "data/yaml_reader.hpp"
@@ -47,13 +48,6 @@ constexpr auto kQuantities = std::to_array<Word>({
     {"temperature", "K"},
     {"power", "W"},
 });
-
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::ranges::transform(result, result.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
 
 /// The known unit that is meant, or nothing.
 std::string_view unit_meant(std::string_view text) {

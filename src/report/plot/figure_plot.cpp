@@ -7,11 +7,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <memory>
 #include <numeric>
 
+#include "core/lower.hpp"
 #include "data/names.hpp"
 #include "report/markup_text.hpp"
 #include "report/plot/figure_painter.hpp"
@@ -31,12 +31,6 @@ using Cairo = std::unique_ptr<cairo_t, decltype(&cairo_destroy)>;
 cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count) {
   static_cast<std::string*>(text)->append(bytes, bytes + count);
   return CAIRO_STATUS_SUCCESS;
-}
-
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return result;
 }
 
 double height_mm(const ReportFigure& figure, const PlotSize& size) {
