@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
 #include <span>
 
 #include "check/checker.hpp"
@@ -21,8 +19,6 @@
 
 namespace torsio {
 namespace {
-
-constexpr std::string_view kFirstRule = "Mapping: channels: ";
 
 std::string_view key_of(CodedNumbers::Kind kind) {
   switch (kind) {
@@ -63,10 +59,11 @@ std::string coding_advice(const Recording& recording, const std::string& name,
     }
   }
   return fmt::format(
-      "{}{{{}: {{from: ..., {}: {:.9g}}}}}, with the column of {} (the number is in {}; give it in "
+      "Mapping: channels: {{{}: {{from: ..., {}: {:.9g}}}}}, with the column of {} (the number is "
+      "in {}; give it in "
       "the "
       "unit of the column)",
-      kFirstRule, name, key_of(coded.kind), coded.span, name, unit_label(name));
+      name, key_of(coded.kind), coded.span, name, unit_label(name));
 }
 
 }  // namespace
@@ -94,27 +91,22 @@ void Checker::check_coding() {
 
 // A value that is written again and again looks like a delay.
 void Checker::check_held() {
-  for_each_record([&](std::size_t r) {
-    const Recording& recording = dataset_.records[r].recording;
-    for (const std::string& name : channels_) {
-      const Channel& channel = recording.channel(name);
-      if (is_condition(recording, name) || stands_still(r, name)) continue;
-      const std::size_t rows = held_rows(channel);
-      if (rows == 0) continue;
-      const double rate_Hz = recording.sample_rate_Hz() / static_cast<double>(rows);
-      const bool is_target = name == dataset_.target;
-      add(Verdict::warn, "resolution", recording.name(),
-          fmt::format(
-              "{} changes in every {}. row only: a sensor of {:.4g} Hz, whose value is held", name,
-              rows, rate_Hz),
-          is_target ? fmt::format("A model would learn the held values as a delay. Mapping line "
-                                  "that trains and scores on "
-                                  "the new ones: hold: [{}]",
-                                  name)
-                    : "An estimate is as late as its input: record that sensor at the rate of the "
-                      "others, or all at its own "
-                      "(clock: {resample: ...} in a mapping).");
-    }
+  for_each_moving_channel([&](std::size_t, const Recording& recording, const Channel& channel) {
+    const std::string& name = channel.name;
+    const std::size_t rows = held_rows(channel);
+    if (rows == 0 || is_condition(recording, name)) return;
+    const double rate_Hz = recording.sample_rate_Hz() / static_cast<double>(rows);
+    const bool is_target = name == dataset_.target;
+    add(Verdict::warn, "resolution", recording.name(),
+        fmt::format("{} changes in every {}. row only: a sensor of {:.4g} Hz, whose value is held",
+                    name, rows, rate_Hz),
+        is_target ? fmt::format("A model would learn the held values as a delay. Mapping line "
+                                "that trains and scores on "
+                                "the new ones: hold: [{}]",
+                                name)
+                  : "An estimate is as late as its input: record that sensor at the rate of the "
+                    "others, or all at its own "
+                    "(clock: {resample: ...} in a mapping).");
   });
 }
 

@@ -35,10 +35,7 @@ void Checker::check_columns_of(std::size_t r) {
   if (spoiled_[r] != 0 || changes_[r]) return;
   const Recording& recording = dataset_.records[r].recording;
   const Pair& pair = pairs_[r];
-  std::vector<double> known = pair.input;
-  for (std::size_t i = 0; i < known.size(); ++i)
-    if (!is_finite(pair.target[i])) known[i] = pair.target[i];
-  const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
+  const std::vector<std::size_t> samples = known_samples(pair);
   if (samples.size() < kFewSamples) return;
   const FixedColumns columns(hysteresis_columns(pair.input, samples));
   const double own = columns.unexplained(at_samples(pair.target, samples));
@@ -108,17 +105,8 @@ bool Checker::hardly_moves(std::size_t r) const {
   const Channel input{.name = spec_.inputs.front(), .values = pairs_[r].input};
   const NoiseCourse course = noise_course(input, dataset_.sample_rate_Hz());
   if (course.sigma.empty()) return false;
-  double mean = 0.0;
-  double square = 0.0;
-  double count = 0.0;
-  for (const double value : input.values) {
-    if (!is_finite(value)) continue;
-    count += 1.0;
-    const double step = value - mean;
-    mean += step / count;
-    square += step * (value - mean);
-  }
-  return square < count * std::pow(kMotionOverNoise * usual_noise(course), 2);
+  const Variation variation = variation_of(input.values);
+  return variation.squares < variation.count * std::pow(kMotionOverNoise * usual_noise(course), 2);
 }
 
 namespace {

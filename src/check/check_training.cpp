@@ -17,20 +17,6 @@
 namespace torsio {
 namespace {
 
-/// Sum of the squared deviations from the mean.
-double variation(const std::vector<double>& values) {
-  double count = 0.0;
-  double mean = 0.0;
-  double squares = 0.0;
-  for (const double value : values) {
-    if (!is_finite(value)) continue;
-    const double step = value - mean;
-    mean += step / ++count;
-    squares += step * (value - mean);
-  }
-  return squares;
-}
-
 /// The clauses of an error in front of its advice.
 std::string problem_of(const Error& error) {
   const std::string_view text = error.what();
@@ -73,7 +59,7 @@ void Checker::check_explanation() {
       share = unexplained_share(pairs_[r], others);
     }
     if (!share) return;
-    const double squares = variation(pairs_[r].target);
+    const double squares = variation_of(pairs_[r].target).squares;
     left_of[r] = {*share * squares, squares};
   });
   double left = 0.0;

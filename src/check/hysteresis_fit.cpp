@@ -54,6 +54,13 @@ std::vector<std::size_t> samples_for_fit(const std::vector<double>& signal, std:
   return samples;
 }
 
+std::vector<std::size_t> known_samples(const Pair& pair, std::size_t enough) {
+  std::vector<double> known = pair.input;
+  for (std::size_t i = 0; i < known.size(); ++i)
+    if (!is_finite(pair.target[i])) known[i] = kNotMeasured;
+  return samples_for_fit(known, 0, known.size(), enough);
+}
+
 Eigen::VectorXd at_samples(const std::vector<double>& values, std::span<const std::size_t> samples,
                            std::ptrdiff_t shift) {
   Eigen::VectorXd result(static_cast<Eigen::Index>(samples.size()));

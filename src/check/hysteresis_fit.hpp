@@ -28,10 +28,16 @@ inline constexpr Eigen::Index kStaticColumns = 10;
   return hysteresis_columns(signal, samples, extent_of(signal));
 }
 
+/// So many samples determine the columns.
+inline constexpr std::size_t kSamplesOfAFit = 10000;
+
 /// Every n-th sample of [begin, end) at which the signal is finite, so that about `enough` remain.
 [[nodiscard]] std::vector<std::size_t> samples_for_fit(const std::vector<double>& signal,
                                                        std::size_t begin, std::size_t end,
-                                                       std::size_t enough = 10000);
+                                                       std::size_t enough = kSamplesOfAFit);
+/// The same over a whole recording, where input and target are finite.
+[[nodiscard]] std::vector<std::size_t> known_samples(const Pair& pair,
+                                                     std::size_t enough = kSamplesOfAFit);
 
 /// The values at these samples.
 [[nodiscard]] Eigen::VectorXd at_samples(const std::vector<double>& values,

@@ -79,6 +79,19 @@ double correlation(const std::vector<double>& x, const std::vector<double>& y) {
   return spread > 0.0 ? (n * xy - sx * sy) / std::sqrt(spread) : 0.0;
 }
 
+Variation variation_of(const std::vector<double>& values) {
+  Variation variation;
+  double mean = 0.0;
+  for (const double value : values) {
+    if (!is_finite(value)) continue;
+    variation.count += 1.0;
+    const double step = value - mean;
+    mean += step / variation.count;
+    variation.squares += step * (value - mean);
+  }
+  return variation;
+}
+
 std::vector<double> movement(const std::vector<double>& values, std::size_t half_window) {
   std::vector<double> differences(values.size(), kNotMeasured);
   for (std::size_t i = half_window; i + half_window < values.size(); ++i)

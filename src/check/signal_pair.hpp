@@ -42,6 +42,13 @@ struct Extent {
 /// Pearson's correlation over the samples where both are finite; 0 if one does not move.
 [[nodiscard]] double correlation(const std::vector<double>& x, const std::vector<double>& y);
 
+/// The finite values and their squared deviations from the mean.
+struct Variation {
+  double count = 0.0;
+  double squares = 0.0;
+};
+[[nodiscard]] Variation variation_of(const std::vector<double>& values);
+
 /// The highest step between two neighbouring samples, and the highest one elsewhere.
 struct Jump {
   std::size_t sample = 0;  ///< the first after the step

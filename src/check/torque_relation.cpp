@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <span>
 #include <utility>
 
@@ -26,7 +27,6 @@ constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
 constexpr double kSlopeChange = 0.12;
 constexpr double kSmallTorqueRest = 0.01;  ///< share of the torque's variance
 constexpr std::size_t kManyReversals = 5;
-constexpr std::size_t kSamplesForFit = 10000;
 constexpr std::size_t kOffParts = 20;  ///< parts of a recording that are looked at
 constexpr std::size_t kMaxOff = 6;     ///< parts
 constexpr double kOffExpected = 0.2;   ///< share of the target's range
@@ -55,14 +55,6 @@ bool is_known(const Pair& pair, std::size_t i) {
 void include_known(Extent& extent, const Pair& pair) {
   for (std::size_t i = 0; i < pair.input.size(); ++i)
     if (is_known(pair, i)) extent.include(pair.input[i]);
-}
-
-/// About so many samples at which input and target are known.
-std::vector<std::size_t> known_samples(const Pair& pair, std::size_t enough = kSamplesForFit) {
-  std::vector<double> known = pair.input;
-  for (std::size_t i = 0; i < known.size(); ++i)
-    if (!is_finite(pair.target[i])) known[i] = kNotMeasured;
-  return samples_for_fit(known, 0, known.size(), enough);
 }
 
 /// With a friction that depends on the load: the stops times the scaled input. Without them its two branches would be
@@ -137,6 +129,51 @@ double median_of(std::vector<double> values) {
   std::ranges::nth_element(values, middle);
   return *middle;
 }
+
+/// The terms z, x z and z^2 of other inputs z over the first input x.
+class OtherTerms {
+ public:
+  OtherTerms(std::span<const Pair> pairs, std::span<const OtherInput> others)
+      : pairs_(pairs), others_(others) {
+    for (const Pair& pair : pairs) include_known(extent_, pair);
+    for (const OtherInput& other : others) {
+      Extent range;
+      std::set<double> levels;
+      for (const std::vector<double>& values : other.values)
+        for (const double value : values) {
+          range.include(value);
+          if (is_finite(value) && levels.size() < kFewestLevels) levels.insert(value);
+        }
+      ranges_.push_back({range, levels.size() >= kFewestLevels});
+    }
+  }
+
+  [[nodiscard]] Eigen::Index count() const { return 3 * static_cast<Eigen::Index>(others_.size()); }
+  /// Range of the first input over all recordings.
+  [[nodiscard]] const Extent& extent() const { return extent_; }
+
+  void put(Eigen::RowVectorXd& row, std::size_t recording, std::size_t sample) const {
+    const double middle = 0.5 * (extent_.lowest + extent_.highest);
+    const double scale = extent_.width() > 0.0 ? 2.0 / extent_.width() : 0.0;
+    const double x = scale * (pairs_[recording].input[sample] - middle);
+    for (std::size_t k = 0; k < others_.size(); ++k) {
+      const auto& [range, has_square] = ranges_[k];
+      const double z = range.width() > 0.0
+                           ? (others_[k].values[recording][sample] - range.lowest) / range.width()
+                           : 0.0;
+      const auto first = static_cast<Eigen::Index>(3 * k);
+      row(first) = z;
+      row(first + 1) = x * z;
+      row(first + 2) = has_square ? z * z : 0.0;
+    }
+  }
+
+ private:
+  std::span<const Pair> pairs_;
+  std::span<const OtherInput> others_;
+  Extent extent_;
+  std::vector<std::pair<Extent, bool>> ranges_;  ///< and whether there is a square
+};
 
 /// Slope of the target over z, by least squares.
 double slope_over(const Eigen::VectorXd& z, const Eigen::VectorXd& target) {
@@ -233,7 +270,7 @@ std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
   std::vector<Eigen::VectorXd> targets;
   Eigen::Index rows = 0;
   for (const Pair* pair : pairs) {
-    const auto samples = known_samples(*pair, kSamplesForFit / pairs.size());
+    const auto samples = known_samples(*pair, kSamplesOfAFit / pairs.size());
     if (samples.size() < kFewestSamples) return {};
     parts.push_back(hysteresis_columns(pair->input, samples, extent));
     targets.push_back(at_samples(pair->target, samples));
@@ -324,80 +361,50 @@ std::optional<SwitchedOff> find_switched_off(const Pair& pair) {
 }
 
 void take_out(std::span<Pair> pairs, std::span<const OtherInput> others) {
-  Extent extent;
-  for (const Pair& pair : pairs) include_known(extent, pair);
-  std::vector<Extent> ranges;
-  std::vector<bool> has_square;
-  for (const OtherInput& other : others) {
-    Extent range;
-    std::vector<double> levels;
-    for (const std::vector<double>& values : other.values)
-      for (const double value : values) {
-        range.include(value);
-        if (is_finite(value) && levels.size() < kFewestLevels &&
-            std::ranges::find(levels, value) == levels.end())
-          levels.push_back(value);
-      }
-    ranges.push_back(range);
-    has_square.push_back(levels.size() >= kFewestLevels);
-  }
-  const double middle = 0.5 * (extent.lowest + extent.highest);
-  const double scale = extent.width() > 0.0 ? 2.0 / extent.width() : 0.0;
-  const auto terms = static_cast<Eigen::Index>(3 * others.size());
-  const auto terms_at = [&](std::size_t r, std::size_t sample) {
-    Eigen::RowVectorXd row(terms);
-    const double x = scale * (pairs[r].input[sample] - middle);
-    for (std::size_t k = 0; k < others.size(); ++k) {
-      const double width = ranges[k].width();
-      const double z = width > 0.0 ? (others[k].values[r][sample] - ranges[k].lowest) / width : 0.0;
-      const auto first = static_cast<Eigen::Index>(3 * k);
-      row(first) = z;
-      row(first + 1) = x * z;
-      row(first + 2) = has_square[k] ? z * z : 0.0;
-    }
-    return row;
-  };
-  std::vector<Eigen::MatrixXd> curves;
-  std::vector<Eigen::MatrixXd> effects;
-  std::vector<Eigen::VectorXd> targets;
+  const OtherTerms terms(pairs, others);
+  Eigen::RowVectorXd of_sample(terms.count());
+  std::vector<std::vector<std::size_t>> samples;
   Eigen::Index rows = 0;
   for (std::size_t r = 0; r < pairs.size(); ++r) {
     Pair usable = pairs[r];
-    for (std::size_t i = 0; i < usable.input.size(); ++i)
-      if (!terms_at(r, i).allFinite()) usable.input[i] = kNotMeasured;
-    const auto samples =
-        known_samples(usable, std::max(kSamplesForFit / pairs.size(), kFewestSamples));
-    if (samples.empty()) continue;
-    curves.push_back(hysteresis_columns(pairs[r].input, samples, extent));
-    effects.emplace_back(static_cast<Eigen::Index>(samples.size()), terms);
-    for (std::size_t i = 0; i < samples.size(); ++i)
-      effects.back().row(static_cast<Eigen::Index>(i)) = terms_at(r, samples[i]);
-    targets.push_back(at_samples(pairs[r].target, samples));
-    rows += curves.back().rows();
+    for (std::size_t i = 0; i < usable.input.size(); ++i) {
+      terms.put(of_sample, r, i);
+      if (!of_sample.allFinite()) usable.input[i] = kNotMeasured;
+    }
+    samples.push_back(
+        known_samples(usable, std::max(kSamplesOfAFit / pairs.size(), kFewestSamples)));
+    rows += static_cast<Eigen::Index>(samples.back().size());
   }
   if (rows < static_cast<Eigen::Index>(kFewestSamples)) return;
-  Eigen::MatrixXd curve(rows, curves.front().cols());
-  Eigen::MatrixXd effect(rows, terms);
+  Eigen::MatrixXd curve;
+  Eigen::MatrixXd effect(rows, terms.count());
   Eigen::VectorXd target(rows);
   Eigen::Index row = 0;
-  for (std::size_t k = 0; k < curves.size(); ++k) {
-    curve.middleRows(row, curves[k].rows()) = curves[k];
-    effect.middleRows(row, curves[k].rows()) = effects[k];
-    target.segment(row, curves[k].rows()) = targets[k];
-    row += curves[k].rows();
+  for (std::size_t r = 0; r < pairs.size(); ++r) {
+    const auto count = static_cast<Eigen::Index>(samples[r].size());
+    const Eigen::MatrixXd part = hysteresis_columns(pairs[r].input, samples[r], terms.extent());
+    if (r == 0) curve.resize(rows, part.cols());
+    curve.middleRows(row, count) = part;
+    target.segment(row, count) = at_samples(pairs[r].target, samples[r]);
+    for (const std::size_t sample : samples[r]) {
+      terms.put(of_sample, r, sample);
+      effect.row(row++) = of_sample;
+    }
   }
   const FixedColumns columns(curve);
   const Eigen::VectorXd rest = columns.residual(target);
-  Eigen::MatrixXd beyond(rows, terms);
-  for (Eigen::Index k = 0; k < terms; ++k) beyond.col(k) = columns.residual(effect.col(k));
+  Eigen::MatrixXd beyond(rows, terms.count());
+  for (Eigen::Index k = 0; k < terms.count(); ++k) beyond.col(k) = columns.residual(effect.col(k));
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(beyond);
   qr.setThreshold(1e-6);
   const Eigen::VectorXd coefficients = qr.solve(rest);
   if (!((rest - beyond * coefficients).squaredNorm() <= kTakenOut * rest.squaredNorm())) return;
   for (std::size_t r = 0; r < pairs.size(); ++r)
-    for (std::size_t i = 0; i < pairs[r].target.size(); ++i)
-      if (const double explained = terms_at(r, i) * coefficients; is_finite(explained))
+    for (std::size_t i = 0; i < pairs[r].target.size(); ++i) {
+      terms.put(of_sample, r, i);
+      if (const double explained = of_sample * coefficients; is_finite(explained))
         pairs[r].target[i] -= explained;
+    }
 }
 
 std::optional<double> unexplained_share(const Pair& pair,
