@@ -200,6 +200,10 @@ TEST(Mapping, UsesThePartOfALogBetweenFromAndTo) {
   const std::string csv = "t_s,x_m\n100,1\n101,2\n102,3\n103,4\n";
   EXPECT_EQ(read(csv, "{from: 1s, to: 2s}")[0].channel("x_m").values, (std::vector{2.0, 3.0}));
   EXPECT_THROW((void)read(csv, "from: 50s"), Error);
+  EXPECT_EQ(read("x_m\n1\n2\n3\n", "{rate: 1Hz, from: 1s}")[0].size(), 2U);
+  EXPECT_NE(
+      test::error_message([&] { (void)read("x_m\n1\n2\n", "from: 1s"); }).find("has no clock"),
+      std::string::npos);
 }
 
 TEST(Mapping, UnwrapsTheCounterOfAClock) {

@@ -25,6 +25,7 @@ Rows rows_between(const TableChannels& columns, std::size_t rows, const Mapping&
     return stamps_s[row] - stamps_s.front();
   };
   Rows used{.begin = 0, .end = rows};
+  if (!columns.clock && !(rate > 0.0)) return used;  // `record_clock` refuses such a log
   if (mapping.from_s > 0.0)
     while (used.begin < rows && !(time_s(used.begin) >= mapping.from_s)) ++used.begin;
   if (std::isfinite(mapping.to_s)) {
