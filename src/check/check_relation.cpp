@@ -219,6 +219,8 @@ void Checker::report_delay(std::size_t r, const Delay& delay) {
 }
 
 void Checker::check_sign() {
+  // Numbers in another coding have no sign yet.
+  if (std::ranges::count(coded_, 1) == std::ssize(coded_)) return;
   pass_unless_found(
       "sign", fmt::format("{} rises with {}", dataset_.target, spec_.inputs.front()), [&] {
         std::vector<double> values(pairs_.size());
@@ -229,6 +231,7 @@ void Checker::check_sign() {
         const bool some_rise =
             std::ranges::any_of(values, [](double value) { return value > kClearCorrelation; });
         for (std::size_t r = 0; r < values.size(); ++r) {
+          if (coded_[r] != 0) continue;
           const std::string& recording = dataset_.records[r].recording.name();
           if (!flipped.empty() && values[r] < kTogether) {
             add(Verdict::fail, "sign", recording,
@@ -284,6 +287,7 @@ void Checker::report_flip(std::size_t r) {
 /// recording, while it does not follow the difference as recorded; empty if there is none.
 std::string Checker::flipped_source(const std::vector<double>& values) const {
   if (std::ranges::all_of(values, [](double v) { return v > kTogether; })) return {};
+  if (std::ranges::count(coded_, 1) > 0) return {};
   bool is_first_minuend = true;
   double direction = 0.0;
   double narrowest = 1.0;
@@ -370,15 +374,17 @@ void Checker::check_offsets() {
     check_zeros();
     std::vector<const Pair*> pairs;
     std::vector<std::size_t> records;
+    std::vector<std::size_t> trained;  // indices into `records`
     double spread = 0.0;
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       if (spoiled_[r] != 0 || changes_[r]) continue;
       pairs.push_back(&pairs_[r]);
+      if (dataset_.records[r].has_role(Role::train)) trained.push_back(records.size());
       records.push_back(r);
       spread = std::max(spread, extent_of(pairs_[r].target).width());
     }
     if (pairs.size() < 2) return;
-    const std::vector<RecordLine> lines = compare_records(pairs);
+    const std::vector<RecordLine> lines = compare_records(pairs, trained);
     for (std::size_t k = 0; k < lines.size(); ++k) report_line(records[k], lines[k], spread);
   });
 }
@@ -386,16 +392,19 @@ void Checker::check_offsets() {
 void Checker::report_line(std::size_t r, const RecordLine& line, double spread) {
   if (line.unexplained > kLinesLeave * line.without_lines) return;
   const Recording& recording = dataset_.records[r].recording;
+  const std::string_view others = dataset_.records[r].has_role(Role::train)
+                                      ? "the other recordings"
+                                      : "the training recordings";
   if (std::abs(line.offset) > kOffsetShare * spread)
     add(std::abs(line.offset) > spread ? Verdict::fail : Verdict::warn, "offsets", recording.name(),
-        fmt::format("the zero is {:.3g} {} away from that of the other recordings{}", line.offset,
-                    unit_label(dataset_.target),
+        fmt::format("the zero is {:.3g} {} away from that of {}{}", line.offset,
+                    unit_label(dataset_.target), others,
                     std::abs(line.offset) > spread ? ", more than the range of the torque" : ""),
         "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: 0.1s}]");
   if (std::abs(line.slope - 1.0) > kGainChange && recording.conditions().empty())
     add(Verdict::warn, "offsets", recording.name(),
-        fmt::format("{} rises {:.3g} times as steeply with {} as in the other recordings",
-                    dataset_.target, line.slope, spec_.inputs.front()),
+        fmt::format("{} rises {:.3g} times as steeply with {} as in {}", dataset_.target,
+                    line.slope, spec_.inputs.front(), others),
         "Recordings of one joint have one stiffness: check the gain of the torque sensor, or list "
         "what differs under conditions: in a manifest.");
 }

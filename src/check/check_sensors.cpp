@@ -12,7 +12,6 @@
 #include "data/finest_step.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/number_coding.hpp"
-#include "numerics/reversals.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/mapping.hpp"
@@ -79,6 +78,7 @@ void Checker::check_coding() {
       const auto coded = find_coded_numbers(values, finest_step(channel));
       if (!coded) return;
       spoiled_[r] = 1;
+      coded_[r] = 1;
       const std::size_t first = samples[coded->first];
       add(Verdict::fail, "coding", recording.name(),
           fmt::format("{} jumps {} times by {:.6g} {}{}; the first time at t = {:.4g} s",
@@ -110,8 +110,7 @@ void Checker::check_held() {
   });
 }
 
-// A torque sensor without supply or with a channel that saturates in its amplifier shows noise. Through a backlash the
-// torque does not change either, but at those inputs only.
+// A torque sensor without supply or with a channel that saturates in its amplifier shows noise.
 void Checker::check_switched_off() {
   for_each_record([&](std::size_t r) {
     const Channel& target = dataset_.records[r].recording.channel(dataset_.target);
@@ -120,12 +119,8 @@ void Checker::check_switched_off() {
     if (!off) return;
     const Recording& recording = dataset_.records[r].recording;
     const bool is_last = off->samples.end == pairs_[r].target.size();
-    // A spring that loses contact or creeps moves in one direction without a change of the torque.
-    const bool is_certain =
-        count_reversals(
-            std::span(pairs_[r].input).subspan(off->samples.begin, off->samples.length()), 1) > 0;
-    if (is_certain) spoiled_[r] = 1;
-    add(is_certain ? Verdict::fail : Verdict::warn, "frozen sensors", recording.name(),
+    spoiled_[r] = 1;
+    add(Verdict::fail, "frozen sensors", recording.name(),
         fmt::format("{} stays within {:.3g} {} from t = {:.4g} s to {}, while the motion of {} "
                     "would change it by {:.3g} {}",
                     dataset_.target, off->passed, unit_label(dataset_.target),

@@ -25,15 +25,15 @@ std::string problem_of(const Error& error) {
 
 }  // namespace
 
-// What a curve over the inputs explains of other samples of the same recordings.
-void Checker::check_determination(const TrainingData& data) {
+// What a curve over the inputs explains of other samples of the same recordings; whether it explains any.
+bool Checker::check_determination(const TrainingData& data) {
   const auto target = split_channel_name(data.target);
-  if (!target || target->unit->si_suffix != "Nm") return;
+  if (!target || target->unit->si_suffix != "Nm") return true;
   const FamilyInfo& curve = find_family("polynomial");
   const HeldOutErrors held_out = held_out_errors(data, [&](const TrainingData& rest) {
     return curve.fit(rest, Options(curve.options, {}), {});
   });
-  if (!(held_out.rmse > kDetermined * held_out.constant_rmse)) return;
+  if (!(held_out.rmse > kDetermined * held_out.constant_rmse)) return true;
   add(Verdict::fail, "training data", "",
       fmt::format("the inputs do not determine {}: a curve fitted to two thirds of each recording "
                   "has an RMSE "
@@ -41,6 +41,7 @@ void Checker::check_determination(const TrainingData& data) {
                   data.target, held_out.rmse, unit_label(data.target), held_out.constant_rmse),
       "Check that inputs and target are of the same joint and time, and that the torque sensor "
       "measures.");
+  return false;
 }
 
 // A sensor that writes something else than its quantity can still be correlated with the motion.
@@ -106,8 +107,7 @@ void Checker::check_training() {
         add(Verdict::warn, "training data", recording, "no sample of it can be used",
             "Check the freshness column of the target and the length of the recording: filters of "
             "the inputs must settle first.");
-      check_determination(data.training);
-      check_explanation();
+      if (check_determination(data.training)) check_explanation();
       data_ = std::move(data);
     } catch (const Error& error) {
       add(Verdict::fail, "training data", "", problem_of(error), error.report().advice);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "check/delay.hpp"
+#include "check/relation_change.hpp"
 #include "check/signal_faults.hpp"
 #include "check/signal_pair.hpp"
 #include "check/torque_relation.hpp"
@@ -42,6 +43,7 @@ class Checker {
     });
     take_out_other_inputs();
     spoiled_.resize(pairs_.size());
+    coded_.resize(pairs_.size());
     stalls_.resize(pairs_.size());
     flips_.resize(pairs_.size());
     changes_.resize(pairs_.size());
@@ -155,7 +157,7 @@ class Checker {
   void report_line(std::size_t r, const RecordLine& line, double spread);
   void check_leak();
   void check_training();
-  void check_determination(const TrainingData& data);
+  [[nodiscard]] bool check_determination(const TrainingData& data);
   void check_range();
   [[nodiscard]] bool has_failed() const;
   static constexpr std::size_t kFewSamples = 100;
@@ -208,6 +210,7 @@ class Checker {
   std::vector<std::string> sources_;            ///< channels of the first input's expression
   std::vector<Pair> pairs_;                     ///< without what `take_out_other_inputs` finds
   std::vector<std::uint8_t> spoiled_;           ///< by record: its relation is known to be wrong
+  std::vector<std::uint8_t> coded_;             ///< by record: numbers of it are in another coding
   std::vector<std::vector<Rest>> stalls_;       ///< by record
   std::vector<std::optional<SignFlip>> flips_;  ///< by record
   std::vector<std::optional<RelationChange>> changes_;  ///< by record

@@ -31,7 +31,7 @@ constexpr std::size_t kDelayStops = 20;
 constexpr double kSmallestStop = 0.004;  ///< share of half the range
 constexpr auto kLoadedStops = std::to_array<std::size_t>({4, 8, 12});
 constexpr auto kRelaxations_s = std::to_array<double>({0.02, 0.2, 2.0, 20.0});
-constexpr Eigen::Index kFree = 3 + static_cast<Eigen::Index>(kDelayHinges.size());
+constexpr Eigen::Index kFree = 4 + static_cast<Eigen::Index>(kDelayHinges.size());
 constexpr Eigen::Index kColumns =
     kFree + static_cast<Eigen::Index>(kDelayStops + kLoadedStops.size() + kRelaxations_s.size());
 constexpr std::size_t kParts = 4;
@@ -68,7 +68,7 @@ bool is_held_out(const Delay& delay) {
   return delay.held_out_share <= kHeldOutShare && delay.better_parts >= kLeastParts;
 }
 
-/// The columns of a dissipative spring over the input: the first kFree are a static curve, the
+/// The columns of a dissipative spring over the input: the first kFree are a drift and a static curve, the
 /// others stop operators (also with a friction that grows with the load) and relaxations. With
 /// coefficients >= 0 the torque of each of the others leads the deflection, as friction, viscosity
 /// and relaxation do, so that none of them can imitate a late torque.
@@ -102,6 +102,7 @@ Eigen::MatrixXd spring_columns(const std::vector<double>& input,
     Eigen::Index column = 0;
     const auto put = [&](double value) { columns(row, column++) = value; };
     put(1.0), put(last), put(last * last * last);
+    put(static_cast<double>(row) / static_cast<double>(columns.rows()) - 0.5);
     for (const double hinge : kDelayHinges) put(std::max(last - hinge, 0.0));
     for (const double stop : stops) put(stop);
     for (const std::size_t k : kLoadedStops) put(stops[k] * std::abs(last));

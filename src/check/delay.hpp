@@ -9,9 +9,9 @@ namespace torsio {
 
 /// The shift of the target at which a dissipative spring over the input explains it best:
 ///
-///     target(t + lag) = f(z) + sum c_k s_k(z) + sum d_k |z| s_k(z) + sum e_l (z - low-pass_l(z))
+///     target(t + lag) = f(z) + a t + sum c_k s_k(z) + sum d_k |z| s_k(z) + sum e_l (z - low-pass_l(z))
 ///
-/// f is a static curve, s_k are stop operators (`hysteresis_fit.hpp`), the low-passes have time
+/// f is a static curve, a the drift of a zero or of a temperature, s_k are stop operators (`hysteresis_fit.hpp`), the low-passes have time
 /// constants from 0.02 to 20 s; c, d, e >= 0 (non-negative least squares). The friction of the
 /// stops does not depend on the speed, a lag shifts fast parts of the motion more than slow ones;
 /// and with these signs friction, viscosity and relaxation only make the torque lead, so that a

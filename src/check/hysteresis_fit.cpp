@@ -91,4 +91,10 @@ double share_of_variance(const Eigen::VectorXd& residual, const Eigen::VectorXd&
   return variance > 0.0 ? residual.squaredNorm() / variance : 1.0;
 }
 
+double slope_over(const Eigen::VectorXd& z, const Eigen::VectorXd& values) {
+  const Eigen::VectorXd varying = z.array() - z.mean();
+  const double variance = varying.squaredNorm();
+  return variance > 0.0 ? varying.dot(values) / variance : 0.0;
+}
+
 }  // namespace torsio

@@ -63,4 +63,7 @@ class FixedColumns {
 [[nodiscard]] double share_of_variance(const Eigen::VectorXd& residual,
                                        const Eigen::VectorXd& values);
 
+/// Slope of values over z, by least squares; 0 if z does not vary.
+[[nodiscard]] double slope_over(const Eigen::VectorXd& z, const Eigen::VectorXd& values);
+
 }  // namespace torsio

@@ -46,6 +46,14 @@ Extent extent_of(std::span<const double> values) {
   return extent;
 }
 
+std::pair<Extent, Extent> known_extents(const Pair& pair, std::size_t begin, std::size_t end) {
+  std::pair<Extent, Extent> extents;
+  for (std::size_t i = begin; i < end; ++i)
+    if (is_known(pair, i))
+      extents.first.include(pair.input[i]), extents.second.include(pair.target[i]);
+  return extents;
+}
+
 std::vector<double> bridged(const Channel& channel) {
   std::vector<double> values(channel.values.size(), kNotMeasured);
   std::size_t last = values.size();

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "torsio/data/recording.hpp"
@@ -31,6 +32,7 @@ struct Extent {
     lowest = std::min(lowest, value);
     highest = std::max(highest, value);
   }
+  void include(const Extent& other) { include(other.lowest), include(other.highest); }
   [[nodiscard]] double width() const { return highest - lowest; }
 };
 [[nodiscard]] Extent extent_of(std::span<const double> values);
@@ -38,6 +40,16 @@ struct Extent {
 /// A channel at every sample, interpolated linearly between the samples that the sensor delivered:
 /// a held value would seem delayed.
 [[nodiscard]] std::vector<double> bridged(const Channel& channel);
+
+[[nodiscard]] inline bool is_known(const Pair& pair, std::size_t i) {
+  return is_finite(pair.input[i]) && is_finite(pair.target[i]);
+}
+/// Extents of input and target over the samples of [begin, end) at which both are finite.
+[[nodiscard]] std::pair<Extent, Extent> known_extents(const Pair& pair, std::size_t begin,
+                                                      std::size_t end);
+[[nodiscard]] inline std::pair<Extent, Extent> known_extents(const Pair& pair) {
+  return known_extents(pair, 0, pair.input.size());
+}
 
 /// Pearson's correlation over the samples where both are finite; 0 if one does not move.
 [[nodiscard]] double correlation(const std::vector<double>& x, const std::vector<double>& y);

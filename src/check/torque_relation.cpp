@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "check/hysteresis_fit.hpp"
-#include "numerics/reversals.hpp"
 #include "torsio/core/estimate.hpp"
 
 namespace torsio {
@@ -20,19 +19,7 @@ constexpr double kStrongCorrelation = 0.8;
 constexpr double kShortestPart = 0.05;  ///< share of the recording
 constexpr double kFlipShare = 0.05;     ///< share of the ranges that each part passes through
 constexpr double kFlipCodes = 5.0;
-constexpr std::size_t kCandidates = 80;
-constexpr std::size_t kFewestReversals = 2;
-constexpr double kChangeLeaves = 0.25;  ///< share of what is unexplained without the change
-constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
-constexpr double kSlopeChange = 0.12;
-constexpr double kSmallTorqueRest = 0.01;  ///< share of the torque's variance
-constexpr std::size_t kManyReversals = 5;
-constexpr std::size_t kOffParts = 20;  ///< parts of a recording that are looked at
-constexpr std::size_t kMaxOff = 6;     ///< parts
-constexpr double kOffExpected = 0.2;   ///< share of the target's range
-constexpr double kOffPassed = 0.1;     ///< share of what is expected
-constexpr double kTakenOut = 0.9;      ///< share of what the curve leaves
-constexpr double kPartShare = 0.2;     ///< share of the input's range that each part passes through
+constexpr double kTakenOut = 0.9;  ///< share of what the curve leaves
 
 /// Running sums of one part of a record.
 struct Sums {
@@ -48,82 +35,6 @@ struct Sums {
   }
 };
 
-bool is_known(const Pair& pair, std::size_t i) {
-  return is_finite(pair.input[i]) && is_finite(pair.target[i]);
-}
-
-void include_known(Extent& extent, const Pair& pair) {
-  for (std::size_t i = 0; i < pair.input.size(); ++i)
-    if (is_known(pair, i)) extent.include(pair.input[i]);
-}
-
-/// With a friction that depends on the load: the stops times the scaled input. Without them its two branches would be
-/// two slopes, one early and one late.
-Eigen::MatrixXd with_loaded_stops(const Eigen::MatrixXd& columns) {
-  const Eigen::Index stops = columns.cols() - kStaticColumns;
-  Eigen::MatrixXd all(columns.rows(), columns.cols() + stops);
-  all << columns, columns.rightCols(stops).array().colwise() * columns.col(1).array();
-  return all;
-}
-
-/// Extents of input and target in [begin, end).
-std::pair<double, double> passed(const Pair& pair, std::size_t begin, std::size_t end) {
-  Extent input;
-  Extent target;
-  for (std::size_t i = begin; i < end; ++i)
-    if (is_known(pair, i)) input.include(pair.input[i]), target.include(pair.target[i]);
-  return {input.width(), target.width()};
-}
-
-/// Whether input and target pass through a good part of their ranges in [begin, end), and the input
-/// reverses there.
-bool is_excited(const Pair& pair, std::size_t begin, std::size_t end, double input_width,
-                double target_width) {
-  const auto [input, target] = passed(pair, begin, end);
-  if (!(input > kPartShare * input_width && target > kPartShare * target_width)) return false;
-  return count_reversals(std::span(pair.input).subspan(begin, end - begin), 1) > 0;
-}
-
-/// What one course over time (0 early, 1 late) of offset and slope explains of a rest.
-struct Explained {
-  double share = 1.0;  ///< share of the variance of the rest that remains
-  double offset = 0.0;
-  double slope = 0.0;  ///< per unit of the scaled input
-  double mean = 0.0;   ///< mean value of the course
-};
-
-class Course {
- public:
-  Course(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target)
-      : columns_(columns),
-        z_(columns.col(1)),
-        rest_(columns_.residual(target)),
-        unexplained_(share_of_variance(rest_, target)) {}
-
-  /// Share of the variance of the target that a fit without a change leaves.
-  [[nodiscard]] double unexplained() const { return unexplained_; }
-
-  [[nodiscard]] Explained explained_by(const Eigen::VectorXd& course) const {
-    Eigen::MatrixXd extra(rest_.size(), 2);
-    extra << columns_.residual(course), columns_.residual(course.cwiseProduct(z_));
-    const Eigen::Matrix2d normal = extra.transpose() * extra;
-    const Eigen::Vector2d moment = extra.transpose() * rest_;
-    const double determinant = normal.determinant();
-    if (!(determinant > 1e-9 * normal(0, 0) * normal(1, 1))) return {};
-    const Eigen::Vector2d solution = normal.inverse() * moment;
-    const double all = rest_.squaredNorm();
-    if (!(all > 0.0)) return {};
-    return {std::max(0.0, 1.0 - solution.dot(moment) / all), solution(0), solution(1),
-            course.mean()};
-  }
-
- private:
-  FixedColumns columns_;
-  Eigen::VectorXd z_;
-  Eigen::VectorXd rest_;
-  double unexplained_ = 1.0;
-};
-
 double median_of(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
@@ -135,7 +46,7 @@ class OtherTerms {
  public:
   OtherTerms(std::span<const Pair> pairs, std::span<const OtherInput> others)
       : pairs_(pairs), others_(others) {
-    for (const Pair& pair : pairs) include_known(extent_, pair);
+    for (const Pair& pair : pairs) extent_.include(known_extents(pair).first);
     for (const OtherInput& other : others) {
       Extent range;
       std::set<double> levels;
@@ -175,13 +86,6 @@ class OtherTerms {
   std::vector<std::pair<Extent, bool>> ranges_;  ///< and whether there is a square
 };
 
-/// Slope of the target over z, by least squares.
-double slope_over(const Eigen::VectorXd& z, const Eigen::VectorXd& target) {
-  const Eigen::VectorXd varying = z.array() - z.mean();
-  const double variance = varying.squaredNorm();
-  return variance > 0.0 ? varying.dot(target) / variance : 0.0;
-}
-
 }  // namespace
 
 std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code, double target_code) {
@@ -211,61 +115,17 @@ std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code, doub
       std::max(kFlipShare * extent_of(pair.target).width(), kFlipCodes * target_code);
   for (const auto& [begin, end] :
        {std::pair<std::size_t, std::size_t>{0, flip.sample}, {flip.sample, pair.input.size()}}) {
-    const auto [input, target] = passed(pair, begin, end);
-    if (!(input >= input_least) || !(target >= target_least)) return {};
+    const auto [input, target] = known_extents(pair, begin, end);
+
+    if (!(input.width() >= input_least) || !(target.width() >= target_least)) return {};
   }
   return flip;
 }
 
-std::optional<RelationChange> find_relation_change(const Pair& pair) {
-  const std::size_t reversals = count_reversals(pair.input);
-  if (correlation(pair.input, pair.target) < kClearCorrelation || reversals < kFewestReversals)
-    return {};
-  const std::vector<std::size_t> samples = known_samples(pair);
-  if (samples.size() < kFewestSamples) return {};
-  const Eigen::MatrixXd columns = hysteresis_columns(pair.input, samples);
-  const Eigen::VectorXd target = at_samples(pair.target, samples);
-  const Course course(with_loaded_stops(columns), target);
-  Pair coarse;
-  for (const std::size_t i : samples)
-    coarse.input.push_back(pair.input[i]), coarse.target.push_back(pair.target[i]);
-  const std::size_t size = coarse.input.size();
-  const auto [input_width, target_width] = passed(coarse, 0, size);
-  Eigen::VectorXd late(target.size());
-  for (Eigen::Index i = 0; i < late.size(); ++i)
-    late(i) = static_cast<double>(i) / static_cast<double>(late.size());
-  Explained best = course.explained_by(late);
-  RelationChange change{.is_gradual = true};
-  for (std::size_t k = 1; k < kCandidates; ++k) {
-    const std::size_t split = size * k / kCandidates;
-    if (!is_excited(coarse, 0, split, input_width, target_width) ||
-        !is_excited(coarse, split, size, input_width, target_width))
-      continue;
-    for (Eigen::Index i = 0; i < late.size(); ++i)
-      late(i) = i < static_cast<Eigen::Index>(split) ? 0.0 : 1.0;
-    const Explained explained = course.explained_by(late);
-    if (explained.share < best.share)
-      best = explained, change = {.is_gradual = false, .sample = samples[split]};
-  }
-  // A motion that hardly repeats has another torque on each stroke: then the rest must vanish.
-  const double rest = best.share * course.unexplained();
-  if (best.share > kChangeLeaves || (rest > kSmallTorqueRest && reversals < kManyReversals))
-    return {};
-  change.offset = best.offset;
-  // The slope without a change is the mean of early and late, each as long as it lasts.
-  const double early = slope_over(columns.col(1), target) - best.mean * best.slope;
-  const double late_slope = early + best.slope;
-  change.slope_ratio = early > 0.0 && late_slope > 0.0 ? late_slope / early : 1.0;
-  const double by_slope = std::abs(change.slope_ratio - 1.0) / kSlopeChange;
-  const double by_offset =
-      std::abs(change.offset) / (kOffsetShare * extent_of(pair.target).width());
-  change.is_of_slope = by_slope > by_offset;
-  return std::max(by_slope, by_offset) >= 1.0 ? std::optional(change) : std::nullopt;
-}
-
-std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
+std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs,
+                                        std::span<const std::size_t> references) {
   Extent extent;
-  for (const Pair* pair : pairs) include_known(extent, *pair);
+  for (const Pair* pair : pairs) extent.include(known_extents(*pair).first);
   std::vector<Eigen::MatrixXd> parts;
   std::vector<Eigen::VectorXd> targets;
   Eigen::Index rows = 0;
@@ -298,8 +158,14 @@ std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
     offsets.push_back(solution(common + 2 * r));
     slopes.push_back(solution(common + 2 * r + 1));
   }
-  const double usual_offset = median_of(offsets);
-  const double usual_slope = median_of(slopes);
+  const auto usual = [&](const std::vector<double>& of_records) {
+    if (references.empty()) return median_of(of_records);
+    std::vector<double> of_references;
+    for (const std::size_t r : references) of_references.push_back(of_records[r]);
+    return median_of(of_references);
+  };
+  const double usual_offset = usual(offsets);
+  const double usual_slope = usual(slopes);
   const double slope = slope_over(columns.col(1), target);
   std::vector<RecordLine> lines;
   for (std::size_t r = 0; r < pairs.size(); ++r)
@@ -309,55 +175,6 @@ std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
          .unexplained = with_lines,
          .without_lines = without_lines});
   return lines;
-}
-
-std::optional<SwitchedOff> find_switched_off(const Pair& pair) {
-  if (std::abs(correlation(pair.input, pair.target)) < kClearCorrelation) return {};
-  const std::vector<std::size_t> samples = known_samples(pair);
-  if (samples.size() < kFewestSamples) return {};
-  const FixedColumns columns(hysteresis_columns(pair.input, samples));
-  const Eigen::VectorXd target = at_samples(pair.target, samples);
-  const Eigen::VectorXd curve = target - columns.residual(target);
-  const double range = extent_of(pair.target).width();
-  struct Part {
-    double expected = 0.0;
-    double passed = 0.0;
-    bool is_off = false;
-  };
-  std::array<Part, kOffParts> parts;
-  const auto size = static_cast<std::size_t>(target.size());
-  const auto begin_of = [&](std::size_t part) { return size * part / kOffParts; };
-  for (std::size_t k = 0; k < kOffParts; ++k) {
-    const auto width = [&](const Eigen::VectorXd& values) {
-      const auto of_part = values.segment(static_cast<Eigen::Index>(begin_of(k)),
-                                          static_cast<Eigen::Index>(begin_of(k + 1) - begin_of(k)));
-      return of_part.maxCoeff() - of_part.minCoeff();
-    };
-    parts[k] = {.expected = width(curve), .passed = width(target)};
-    parts[k].is_off = parts[k].expected >= kOffExpected * range &&
-                      parts[k].passed <= kOffPassed * parts[k].expected;
-  }
-  const auto first = std::ranges::find(parts, true, &Part::is_off);
-  if (first == parts.end()) return {};
-  // As far as the target remains as quiet, also where the motion turns.
-  SwitchedOff off{.samples = {}, .passed = first->passed, .expected = first->expected};
-  std::size_t begin = static_cast<std::size_t>(first - parts.begin());
-  std::size_t end = begin + 1;
-  const auto is_quiet = [&](const Part& part) {
-    return part.passed <= kOffPassed * first->expected;
-  };
-  while (begin > 0 && is_quiet(parts[begin - 1])) --begin;
-  while (end < kOffParts && is_quiet(parts[end])) ++end;
-  const auto off_elsewhere = std::ranges::any_of(parts.begin() + static_cast<std::ptrdiff_t>(end),
-                                                 parts.end(), &Part::is_off);
-  if (end - begin > kMaxOff || off_elsewhere) return {};
-  for (std::size_t k = begin; k < end; ++k) {
-    off.passed = std::max(off.passed, parts[k].passed);
-    off.expected = std::max(off.expected, parts[k].expected);
-  }
-  off.samples = {.begin = samples[begin_of(begin)],
-                 .end = end < kOffParts ? samples[begin_of(end)] : pair.target.size()};
-  return off;
 }
 
 void take_out(std::span<Pair> pairs, std::span<const OtherInput> others) {

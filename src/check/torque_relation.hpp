@@ -26,33 +26,6 @@ struct SignFlip {
 [[nodiscard]] std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code,
                                                      double target_code);
 
-/// Change of the torque at equal input between early and late parts of one recording.
-struct RelationChange {
-  bool is_gradual = false;   ///< over the whole recording, else at `sample`
-  std::size_t sample = 0;    ///< the first of the second part, about
-  double offset = 0.0;       ///< late minus early, in the middle of the input's range
-  double slope_ratio = 1.0;  ///< late over early
-  bool is_of_slope = false;  ///< true: the slope changed; false: the offset
-};
-
-/// The torque is fitted by a static curve with hysteresis over the input (`hysteresis_columns`). If
-/// one step or one linear trend in time, of offset and slope, explains three quarters of what
-/// remains, the joint or a sensor changed. Only offsets above 5 % of the torque's range and slopes
-/// that change by more than 12 % are reported; empty if the torque does not follow the input, or
-/// the motion does not reverse on both sides of the step.
-[[nodiscard]] std::optional<RelationChange> find_relation_change(const Pair& pair);
-
-/// A part of a recording in which the target hardly changes, although it follows the input elsewhere.
-struct SwitchedOff {
-  Rest samples;
-  double passed = 0.0;    ///< range that the target passes through in it
-  double expected = 0.0;  ///< what the curve of the whole recording passes through
-};
-/// The recording is divided into twenty parts; in one the target passes through less than a tenth of what the curve with
-/// hysteresis passes through, and that is at least a fifth of the range of the target. The neighbours in which it is as
-/// quiet belong to it. Empty if these are more than six, or if it happens elsewhere, too: then it is a backlash.
-[[nodiscard]] std::optional<SwitchedOff> find_switched_off(const Pair& pair);
-
 /// Offset and slope of the torque of each recording at common inputs: all recordings are fitted by
 /// one static curve with hysteresis, and by an offset and a slope for each.
 struct RecordLine {
@@ -61,7 +34,9 @@ struct RecordLine {
   double unexplained = 1.0;    ///< share of the variance of all targets
   double without_lines = 1.0;  ///< the same for the common curve alone
 };
-[[nodiscard]] std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs);
+/// @param references the recordings (indices) among which the usual one is; empty: all
+[[nodiscard]] std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs,
+                                                      std::span<const std::size_t> references = {});
 
 /// A quantity besides motion and load that can change the torque: a temperature, a pressure.
 struct OtherInput {

@@ -9,10 +9,14 @@
 #include <limits>
 #include <optional>
 #include <set>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "evaluate/common_samples.hpp"
 #include "evaluate/fit_and_score.hpp"
+#include "evaluate/model_label.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
@@ -140,6 +144,33 @@ std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view 
   return choices;
 }
 
+namespace {
+
+/// The notes of the fits that are warnings, each with the models that have it.
+std::vector<std::string> warnings_of(const std::vector<ScoredModel>& models) {
+  constexpr std::string_view kWarning = "warning: ";
+  std::vector<std::pair<std::string, std::string>> found;  // text, models
+  for (const ScoredModel& model : models) {
+    if (!model.trained) continue;
+    for (const std::string& note : model.trained->notes) {
+      if (!note.starts_with(kWarning)) continue;
+      const std::string text = note.substr(kWarning.size());
+      const std::string label = model_label(model.rows.front());
+      const auto known =
+          std::ranges::find(found, text, &std::pair<std::string, std::string>::first);
+      if (known == found.end())
+        found.emplace_back(text, label);
+      else
+        known->second += ", " + label;
+    }
+  }
+  std::vector<std::string> warnings;
+  for (const auto& [text, labels] : found) warnings.push_back(fmt::format("{}: {}", labels, text));
+  return warnings;
+}
+
+}  // namespace
+
 Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
                    std::uint64_t seed, bool allow_leak, const Progress& progress) {
   dataset.check();
@@ -169,6 +200,7 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
                                    model.rows.front().input_set, model.trained->file});
   comparison.best =
       best_of(models, dataset.has_role(Role::validation) ? Role::validation : Role::test);
+  results.warnings = warnings_of(models);
   for (ScoredModel& model : models) std::ranges::move(model.rows, std::back_inserter(results.rows));
   return comparison;
 }

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "evaluate/model_label.hpp"
 #include "torsio/evaluate/results.hpp"
 #include "torsio/report/text_table.hpp"
 
@@ -28,10 +29,6 @@ struct RankedRows {
   std::vector<Other> others;  ///< not in the ranking
 };
 [[nodiscard]] RankedRows ranked_rows(const Results& results, Role split);
-/// "polynomial[branch=false] (with current)"
-[[nodiscard]] std::string model_label(const ResultRow& row);
-/// "polynomial[branch=false]"
-[[nodiscard]] std::string model_label(std::string_view family, std::string_view variant);
 /// Three decimals below 1e6; three significant digits in a table whose smallest error needs
 /// more decimals.
 [[nodiscard]] std::string error_text(double value, double smallest = 1.0);

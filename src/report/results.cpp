@@ -114,15 +114,6 @@ Json json_number(double value) { return std::isfinite(value) ? Json(value) : Jso
 
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
-std::string model_label(std::string_view family, std::string_view variant) {
-  return variant.empty() ? std::string(family) : fmt::format("{}[{}]", family, variant);
-}
-
-std::string model_label(const ResultRow& row) {
-  const std::string label = model_label(row.family, row.variant);
-  return row.input_set.empty() ? label : fmt::format("{} ({})", label, row.input_set);
-}
-
 std::string error_text(double value, double smallest) {
   constexpr double kTooSmallForThreePlaces = 0.005;
   if (smallest < kTooSmallForThreePlaces && value != 0.0) return fmt::format("{:.3g}", value);
@@ -153,6 +144,7 @@ Json results_document(const Results& results) {
                                     {"common_samples", ranking.common_samples},
                                     {"is_ranked", ranking.is_possible()},
                                     {"best_fit_percent", json_number(ranking.best_fit_percent)}});
+  if (!results.warnings.empty()) document["warnings"] = results.warnings;
   document["results"] = Json::array();
   for (const ResultRow& row : results.rows) {
     const auto add = [&](const Metrics& metrics, std::string_view mode) {

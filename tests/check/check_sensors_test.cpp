@@ -1,5 +1,7 @@
 // Sensors that write something else than their quantity: coded numbers, held values, a torque that is switched off.
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 #include "check/check_support.hpp"
@@ -8,6 +10,7 @@
 namespace torsio {
 namespace {
 
+using test::add_record;
 using test::alone;
 using test::bench_recording;
 using test::changed;
@@ -33,6 +36,10 @@ TEST(CheckSensors, NameSignedNumbersThatWereReadAsUnsigned) {
   const Finding& found = first_of(findings, "coding");
   EXPECT_NE(found.message.find("65536 of its steps"), std::string::npos) << found.message;
   EXPECT_NE(found.advice.find("modulus: 1310.72"), std::string::npos) << found.advice;
+  // Numbers that are still coded have no sign.
+  EXPECT_TRUE(std::ranges::none_of(findings, [](const Finding& finding) {
+    return finding.check == "sign";
+  })) << text_of(findings);
 }
 
 TEST(CheckSensors, NameASignBit) {
@@ -154,6 +161,102 @@ TEST(CheckSensors, DoNotTakeALoadDependentFrictionForAChange) {
     const auto findings = findings_of(alone(recording));
     EXPECT_EQ(verdict_of(findings, "change"), Verdict::pass) << cycles << ": " << text_of(findings);
   }
+}
+
+/// A deflection with dry friction inside: 20 Nm/rad where the load grows, 33 where it falls. The load holds at its extremes,
+/// as a command of ramps makes it.
+Recording wedge_recording(std::size_t cycles) {
+  constexpr double kLoading_Nm_rad = 20.0;
+  constexpr double kUnloading_Nm_rad = 33.0;
+  constexpr double kPeriod_s = 30.0;
+  constexpr std::size_t kWedgeRate_Hz = 50;
+  const auto command_Nm = [](double t_s) {
+    const double phase = 4.0 * std::fmod(t_s, kPeriod_s) / kPeriod_s;
+    const double triangle = phase < 1.0 ? phase : phase < 3.0 ? 2.0 - phase : phase - 4.0;
+    return std::clamp(9.0 * triangle, -7.0, 7.0);
+  };
+  Random random(5);
+  Channel deflection{"spring_deflection_rad", {}};
+  Channel torque{"torque_Nm", {}};
+  double load_Nm = 0.0;
+  double x = 0.0;
+  for (std::size_t n = 0; n < cycles * 30 * kWedgeRate_Hz; ++n) {
+    const double next_Nm = command_Nm(static_cast<double>(n) / kWedgeRate_Hz);
+    const bool is_loading = std::abs(next_Nm) > std::abs(load_Nm);
+    x += (next_Nm - load_Nm) / (is_loading ? kLoading_Nm_rad : kUnloading_Nm_rad);
+    load_Nm = next_Nm;
+    deflection.values.push_back(x + 1e-3 * random.normal());
+    torque.values.push_back(load_Nm + 0.02 * random.normal());
+  }
+  Recording recording("wedge", static_cast<double>(kWedgeRate_Hz));
+  recording.add(std::move(deflection));
+  recording.add(std::move(torque));
+  return recording;
+}
+
+TEST(CheckSensors, CompareBranchesOfALoadDependentFrictionWithEachOther) {
+  for (const std::size_t cycles : {1, 2, 3, 4, 5}) {
+    const auto findings = findings_of(alone(wedge_recording(cycles)));
+    EXPECT_EQ(verdict_of(findings, "change"), Verdict::pass) << cycles << ": " << text_of(findings);
+  }
+  // A zero that slips between the cycles is found all the same.
+  const auto findings = findings_of(alone(changed(wedge_recording(4), [](Channel& channel) {
+    if (channel.name == "torque_Nm")
+      for (std::size_t n = channel.values.size() / 2; n < channel.values.size(); ++n)
+        channel.values[n] += 1.5;
+  })));
+  EXPECT_EQ(verdict_of(findings, "change"), Verdict::warn) << text_of(findings);
+}
+
+TEST(CheckSensors, DoNotTakeACreepUnderNoLoadForATorqueThatIsSwitchedOff) {
+  for (const std::uint64_t seed : {101, 102}) {
+    const auto findings = findings_of(
+        alone(simulate({.actuator = "elastomer:unbonded", .experiment = "hold", .seed = seed})));
+    EXPECT_EQ(verdict_of(findings, "frozen sensors"), Verdict::pass) << text_of(findings);
+  }
+}
+
+TEST(CheckSensors, DoNotTakeADriftForADelay) {
+  const auto findings = findings_of(alone(changed(bench_recording("warm"), [](Channel& channel) {
+    if (channel.name == "torque_Nm")
+      for (std::size_t n = 0; n < channel.values.size(); ++n)
+        channel.values[n] += 1e-4 * static_cast<double>(n);
+  })));
+  EXPECT_EQ(verdict_of(findings, "delay"), Verdict::pass) << text_of(findings);
+}
+
+TEST(CheckSensors, NameTheTestRecordingWhoseZeroIsAnother) {
+  Dataset dataset;
+  add_record(dataset, bench_recording("trained"), Role::train);
+  add_record(dataset,
+             changed(bench_recording("tested"),
+                     [](Channel& channel) {
+                       if (channel.name == "torque_Nm")
+                         for (double& value : channel.values) value += 6.0;
+                     }),
+             Role::test);
+  const auto findings = findings_of(dataset);
+  ASSERT_EQ(verdict_of(findings, "offsets"), Verdict::warn) << text_of(findings);
+  EXPECT_EQ(first_of(findings, "offsets").recording, "tested");
+  EXPECT_NE(
+      first_of(findings, "offsets").message.find("6 Nm away from that of the training recordings"),
+      std::string::npos)
+      << text_of(findings);
+}
+
+TEST(CheckSensors, ReadALogOfTenHertzWithTheDefaultInputs) {
+  Recording slow("slow", 10.0);
+  const Recording fast = wedge_recording(5);
+  for (const Channel& channel : fast.channels()) {
+    Channel every_fifth{channel.name, {}};
+    for (std::size_t n = 0; n < channel.values.size(); n += 5)
+      every_fifth.values.push_back(channel.values[n]);
+    slow.add(std::move(every_fifth));
+  }
+  const auto findings = findings_of(alone(slow));
+  EXPECT_TRUE(std::ranges::none_of(findings, [](const Finding& finding) {
+    return finding.verdict == Verdict::fail;
+  })) << text_of(findings);
 }
 
 }  // namespace

@@ -224,6 +224,15 @@ TEST(Csv, ARowOfUnitsIsRead) {
   EXPECT_EQ(table.line_of(0), 3U);
 }
 
+TEST(Csv, AHeaderThatIsRepeatedIsNotReadAgain) {
+  const LogTable table = parse_csv("t,a\ns,Nm\n0,1\n1,2\n\"t\", a\ns,Nm\n0,3\nt,a\n1,4\n", "a.csv");
+  ASSERT_EQ(table.columns.size(), 2U);
+  EXPECT_EQ(table.columns[1].values, (std::vector<double>{1.0, 2.0, 3.0, 4.0}));
+  EXPECT_EQ(table.notes.back(), "the header is repeated, first in line 5: it is not read again");
+  EXPECT_EQ(table.line_of(2), 7U);
+  EXPECT_THROW(static_cast<void>(parse_csv("t,a\n0,1\na,t\n1,2\n", "a.csv")), Error);
+}
+
 TEST(Csv, UnitsInBracketsAreReadButNoIndices) {
   const LogTable table = parse_csv(
       "Time [ms],Motor torque (N\xc2\xb7m),w [deg/s],q[0],x(1),y [foo],n [-],a_rad [1]\n"

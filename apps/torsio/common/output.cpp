@@ -24,6 +24,10 @@ void remark(std::string_view text) {
   std::fprintf(stderr, "%.*s\n", static_cast<int>(text.size()), text.data());
 }
 
+void remark_note(std::string_view note) {
+  remark(note.starts_with("warning: ") ? std::string(note) : "note: " + std::string(note));
+}
+
 void JsonOutput::write(std::string_view document) const {
   if (destination.empty()) return;
   write_text(destination, document);

@@ -34,3 +34,5 @@ void write_text(const std::string& path, std::string_view text);
 void print(std::string_view text);
 /// Prints a remark to stderr.
 void remark(std::string_view text);
+/// Prints a note of a fit to stderr; one that is a warning begins with that word.
+void remark_note(std::string_view note);

@@ -66,6 +66,7 @@ void run(CompareFlags& flags) {
     if (const std::string note = torsio::ranking_note(ranking);
         !flags.json.wants_tables() && !note.empty())
       remark(std::string(torsio::name(ranking.split)) + ": " + note);
+  for (const std::string& warning : comparison.results.warnings) remark("warning: " + warning);
   if (has_all(flags.models))
     remark(
         fmt::format("note: all leaves out {} families, which --help lists: add them by name, as in "

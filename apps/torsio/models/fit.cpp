@@ -169,7 +169,7 @@ void run_one(FitFlags& flags) {
   refuse_diverged(results.rows.front());
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());
-  for (const std::string& note : trained.notes) remark("note: " + note);
+  for (const std::string& note : trained.notes) remark_note(note);
   for (const torsio::ResultRow& row : results.rows)
     if (row.status != "ok" && !row.recording)
       remark(fmt::format("warning: {} on {}: {}", row.status, torsio::name(row.split), row.reason));

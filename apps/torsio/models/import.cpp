@@ -108,7 +108,7 @@ void run(ImportFlags& flags) {
   if (flags.json.wants_tables()) print(torsio::model_description(model, cycle));
   flags.json.write(torsio::model_description_json(model, cycle));
   torsio::save_model(flags.output, imported.file);  // last: untouched unless all else succeeded
-  for (const std::string& note : imported.notes) remark("note: " + note);
+  for (const std::string& note : imported.notes) remark_note(note);
   remark(flags.output + " written");
 }
 

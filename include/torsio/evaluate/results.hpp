@@ -55,6 +55,7 @@ struct Results {
   std::vector<std::pair<std::string, std::vector<std::string>>> input_sets = {};
   bool non_causal_zero = false;
   std::vector<ResultRow> rows = {};
+  std::vector<std::string> warnings = {};  ///< from the fits, each with the models that it is about
   std::vector<Ranking> rankings = {};  ///< one for each held-out split; empty: nothing was compared
 };
 

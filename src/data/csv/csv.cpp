@@ -46,6 +46,7 @@ class TableParser {
  public:
   TableParser(LogTable& table, const CsvStart& start, const CsvOptions& options, ReadBudget& budget)
       : table_(table),
+        start_(start),
         separator_(start.header.separator),
         options_(options),
         budget_(budget),
@@ -67,6 +68,19 @@ class TableParser {
       if (read_decimal(at, value) && *at == '\0') missing_numbers_.push_back(value);
     }
     choose_columns();
+  }
+
+  /// Whether a line is the header or the row of units once more: a logger that was started twice writes both again.
+  [[nodiscard]] bool is_header_again(std::string_view line) const {
+    const unsigned char first = static_cast<unsigned char>(line.front());
+    if (std::isalpha(first) == 0 && first != '"' && first != '[' && first != separator_)
+      return false;
+    const std::vector<std::string> cells = cells_of(line, separator_);
+    return cells == start_.header.names || cells == start_.units;
+  }
+
+  void skip_header(std::size_t number) {
+    if (header_again_ == 0) header_again_ = number;
   }
 
   /// `line` must be followed by a '\n' in memory.
@@ -132,6 +146,9 @@ class TableParser {
       table_.notes.push_back(
           fmt::format("units in brackets in the header are read, such as that of '{}'",
                       printable(column_in_brackets_)));
+    if (header_again_ > 0)
+      table_.notes.push_back(fmt::format(
+          "the header is repeated, first in line {}: it is not read again", header_again_));
     if (has_empty_ends_)
       table_.notes.emplace_back("empty cells after the last column are not read");
     if (has_local_times_) table_.notes.emplace_back("time stamps without a zone are read as UTC");
@@ -326,6 +343,7 @@ class TableParser {
   }
 
   LogTable& table_;
+  const CsvStart& start_;
   char separator_;
   const CsvOptions& options_;
   ReadBudget& budget_;
@@ -336,6 +354,7 @@ class TableParser {
   std::map<std::string, std::size_t, std::less<>> missing_marks_;
   std::size_t rows_ = 0;
   std::size_t last_line_ = 0;
+  std::size_t header_again_ = 0;  ///< its first line; 0: none
   bool comma_seen_ = false;
   bool point_seen_ = false;
   bool has_local_times_ = false;
@@ -359,7 +378,10 @@ LogTable read_csv(ByteSource& source, const std::string& name, const CsvOptions&
     constexpr std::size_t kTextPerElement = 16;  // comments of a packed file take time, too
     budget.work(1 + line.size() / kTextPerElement);
     if (!is_comment_or_blank(line)) {
-      parser.add(line, number);
+      if (parser.is_header_again(line))
+        parser.skip_header(number);
+      else
+        parser.add(line, number);
       gap_bytes = 0;
       return;
     }

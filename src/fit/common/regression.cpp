@@ -4,7 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "core/did_you_mean.hpp"
@@ -12,6 +14,7 @@
 #include "numerics/least_squares.hpp"
 #include "numerics/nnls.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -97,6 +100,19 @@ LeastSquares solve(const Matrix& columns, const std::vector<double>& target,
   return {std::move(fit.coefficients), std::move(fit.dropped)};
 }
 
+/// What least squares leave of the sum of squares.
+double squares_left(const Matrix& columns, const std::vector<double>& target,
+                    std::span<const std::uint8_t> is_free) {
+  const std::vector<double> coefficients = solve(columns, target, is_free).coefficients;
+  double squares = 0.0;
+  for (std::size_t n = 0; n < target.size(); ++n) {
+    const double estimate =
+        std::inner_product(coefficients.begin(), coefficients.end(), columns.row(n).begin(), 0.0);
+    squares += (target[n] - estimate) * (target[n] - estimate);
+  }
+  return squares;
+}
+
 }  // namespace
 
 Matrix rows_of(const Matrix& matrix, std::span<const std::size_t> samples) {
@@ -168,6 +184,48 @@ DesignFit fit_design(const Design& design, const Groups& groups,
 bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups, bool rates) {
   const bool schedules = groups.frame.scheduled && groups.frame.feature == input;
   return !schedules && (rates || !data.inputs[input].is_rate);
+}
+
+void note_on_rates(std::vector<std::string>& notes, const Design& design, const Groups& groups,
+                   const TrainingData& data, const Matrix& features, std::string_view family,
+                   std::span<const std::uint8_t> is_free) {
+  constexpr double kWorthANote = 0.9;
+  constexpr double kNegligible = 1e-6;  // share of the target's variance
+  std::vector<std::size_t> rates;
+  for (std::size_t j = 0; j < data.input_count(); ++j)
+    if (data.inputs[j].is_rate && has_slope(data, j, groups, true)) rates.push_back(j);
+  if (rates.empty()) return;
+  std::vector<std::uint8_t> free_with_rates(is_free.begin(), is_free.end());
+  if (!is_free.empty()) free_with_rates.resize(is_free.size() + rates.size(), 1);
+  double without = 0.0;
+  double with = 0.0;
+  double count = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const std::vector<std::size_t>& all : groups.samples) {
+    std::vector<std::size_t> samples;
+    for (std::size_t n = 0; n < all.size(); n += 1 + all.size() / kSamplesOfANote)
+      samples.push_back(all[n]);
+    const Matrix columns = rows_of(design.columns, samples);
+    const std::vector<double> target = rows_of(design.target, samples);
+    Matrix more(samples.size(), columns.columns + rates.size());
+    for (std::size_t n = 0; n < samples.size(); ++n) {
+      auto rest = std::ranges::copy(columns.row(n), more.row(n).begin()).out;
+      for (const std::size_t j : rates) *rest++ = features(samples[n], j);
+    }
+    without += squares_left(columns, target, is_free);
+    with += squares_left(more, target, free_with_rates);
+    for (const double value : target) count += 1.0, sum += value, squares += value * value;
+  }
+  if (!(without > kNegligible * (squares - sum * sum / count))) return;
+  if (!(std::sqrt(with) <= kWorthANote * std::sqrt(without))) return;
+  std::vector<std::string> names;
+  for (const std::size_t j : rates) names.push_back(data.inputs[j].expression);
+  notes.push_back(fmt::format(
+      "warning: {0} has no slope over rates ({1}); with them, the RMSE of the training would be "
+      "{2:.4g} instead of {3:.4g} {4}: --set rates=true, in --models {0}:rates=true",
+      family, fmt::join(names, ", "), std::sqrt(with / count), std::sqrt(without / count),
+      unit_label(data.target)));
 }
 
 std::size_t first_rate(const TrainingData& data, std::string_view family) {

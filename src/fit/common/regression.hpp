@@ -68,6 +68,15 @@ inline constexpr std::size_t kSamplesPerTerm = 5;
 [[nodiscard]] bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups,
                              bool rates);
 
+/// Appends a note if slopes of the rates, which the design has not, would reduce the RMSE of the training to nine
+/// tenths or less. At most `kSamplesOfANote` samples of each group are fitted for it.
+/// @param features samples x inputs, the rows of the design
+/// @param is_free as for `fit_design`
+void note_on_rates(std::vector<std::string>& notes, const Design& design, const Groups& groups,
+                   const TrainingData& data, const Matrix& features, std::string_view family,
+                   std::span<const std::uint8_t> is_free = {});
+inline constexpr std::size_t kSamplesOfANote = 20000;
+
 /// The first input that is a rate. @throws Error that names the family if there is none.
 [[nodiscard]] std::size_t first_rate(const TrainingData& data, std::string_view family);
 

@@ -121,6 +121,9 @@ Fitted<OperatorSum<Operator>> fit(const TrainingData& data, const Own& options, 
   if (is_passive) std::fill(is_free.begin() + static_cast<std::ptrdiff_t>(first), is_free.end(), 0);
   DesignFit fit = fit_design(design, groups, is_free);
   fitted.notes = std::move(fit.notes);
+  if (!options.rates)
+    note_on_rates(fitted.notes, design, groups, data, table.features,
+                  OperatorSum<Operator>::kFamily, is_free);
   Matrix& values = fit.coefficients.values;
   if (values.rows == 1) {
     fitted.table = table_of(runs, design, parameters.thresholds, values.values);

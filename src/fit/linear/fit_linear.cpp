@@ -156,6 +156,8 @@ Fitted<Linear> fit_linear(const TrainingData& data, const LinearOptions& options
          .advice = "Add an input that is none, or let rates have slopes: --set rates=true."});
   DesignFit fit = fit_design(design, groups);
   Fitted<Linear> fitted{{std::move(fit.coefficients)}, std::move(fit.notes)};
+  if (!options.rates)
+    note_on_rates(fitted.notes, design, groups, data, table.features, Linear::kFamily);
   fitted.table =
       fitted_coefficients(fitted.parameters, fitted.parameters.coefficients.values, design, data);
   return fitted;
@@ -183,6 +185,8 @@ Fitted<LinearCoulomb> fit_linear_coulomb(const TrainingData& data,
   DesignFit fit = fit_design(design, groups);
   parameters.coefficients = std::move(fit.coefficients);
   std::ranges::move(fit.notes, std::back_inserter(fitted.notes));
+  if (!options.rates)
+    note_on_rates(fitted.notes, design, groups, data, table.features, LinearCoulomb::kFamily);
   fitted.table = fitted_coefficients(parameters, parameters.coefficients.values, design, data);
   return fitted;
 }

@@ -210,6 +210,8 @@ Fitted<Polynomial> fit_polynomial(const TrainingData& data, const PolynomialOpti
   parameters.coefficients = std::move(fit.coefficients);
   fitted.table = fitted_coefficients(parameters, parameters.coefficients.values, design, data);
   std::ranges::move(fit.notes, std::back_inserter(fitted.notes));
+  if (!options.rates)
+    note_on_rates(fitted.notes, design, groups, data, samples.features, Polynomial::kFamily);
   return fitted;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -20,6 +21,7 @@
 #include "fit/network/network_trainer.hpp"
 #include "fit/network/network_windows.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/files/model_file.hpp"
 
 namespace torsio {
@@ -149,8 +151,24 @@ Material prepare(const TrainingData& data, const TrainingWindows& windows, std::
   return material;
 }
 
-std::vector<std::string> notes_of(const Material& material, const TrainedNetwork& trained,
-                                  const TrainingData& data, std::size_t epochs) {
+/// What came out of a training, with what it was trained on.
+struct Outcome {
+  TrainedNetwork network;
+  Material material;
+  std::size_t starts = 1;
+  double training_loss = 0.0;  ///< standardised mean square error on the training windows
+  double linear_loss = 0.0;    ///< the same for a linear model
+};
+
+bool is_worse_than_linear(const Outcome& outcome) {
+  constexpr double kClearly = 1.21;  // an RMSE of 1.1 times
+  return outcome.training_loss > kClearly * outcome.linear_loss;
+}
+
+std::vector<std::string> notes_of(const Outcome& outcome, const TrainingData& data,
+                                  std::size_t epochs) {
+  const TrainedNetwork& trained = outcome.network;
+  const Material& material = outcome.material;
   const double rmse = std::sqrt(trained.best_loss) * material.scaling.target_scale;
   const bool is_validated = !material.validation.starts.empty();
   std::vector<std::string> notes;
@@ -166,16 +184,26 @@ std::vector<std::string> notes_of(const Material& material, const TrainedNetwork
     notes.emplace_back("the last epoch was the best: more epochs may do better");
   if (!is_validated)
     notes.emplace_back("too little data to hold any out: nothing guarded against overfitting");
+  if (outcome.starts > 1)
+    notes.push_back(
+        fmt::format("trained from {} starts: the first ended above the error of a linear model",
+                    outcome.starts));
+  if (is_worse_than_linear(outcome))
+    notes.push_back(fmt::format(
+        "warning: on its own training data the network is worse than a linear model: RMSE {:.4g} "
+        "instead of {:.4g} {}; more epochs, another learning_rate or other inputs may help",
+        std::sqrt(outcome.training_loss) * material.scaling.target_scale,
+        std::sqrt(outcome.linear_loss) * material.scaling.target_scale, unit_label(data.target)));
   return notes;
 }
 
 template <class Family>
-Trained<Family> result_of(typename Family::Parameters parameters, TrainedNetwork trained,
-                          const Material& material, const TrainingData& data, std::size_t epochs) {
-  std::vector<std::string> notes = notes_of(material, trained, data, epochs);
-  const double rmse = std::sqrt(trained.best_loss) * material.scaling.target_scale;
-  return {std::move(parameters), std::move(trained.weights), trained.best_loss, rmse,
-          std::move(notes)};
+Trained<Family> result_of(typename Family::Parameters parameters, Outcome outcome,
+                          const TrainingData& data, std::size_t epochs) {
+  std::vector<std::string> notes = notes_of(outcome, data, epochs);
+  const double loss = outcome.network.best_loss;
+  const double rmse = std::sqrt(loss) * outcome.material.scaling.target_scale;
+  return {std::move(parameters), std::move(outcome.network.weights), loss, rmse, std::move(notes)};
 }
 
 /// What there is to train: which layers, and how.
@@ -200,29 +228,83 @@ TrainedNetwork finished_network(const Job& job) {
           .end = {}};
 }
 
-/// The part that the three fits have in common. `put_initial(network, weights)` sets the start.
+/// The mean square error of a linear model of the samples in the loss, fitted to them.
+double linear_loss(const WindowSet& set) {
+  const auto columns = static_cast<Eigen::Index>(set.inputs + 1);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
+  Eigen::VectorXd moment = Eigen::VectorXd::Zero(columns);
+  Eigen::VectorXd row = Eigen::VectorXd::Ones(columns);
+  double squares = 0.0;
+  double count = 0.0;
+  for (std::size_t n = 0; n < set.targets.size(); ++n) {
+    if (set.use[n] == 0) continue;
+    for (std::size_t j = 0; j < set.inputs; ++j)
+      row(static_cast<Eigen::Index>(j)) = static_cast<double>(set.features[n * set.inputs + j]);
+    const auto target = static_cast<double>(set.targets[n]);
+    normal += row * row.transpose();
+    moment += target * row;
+    squares += target * target;
+    count += 1.0;
+  }
+  const Eigen::VectorXd solution = normal.completeOrthogonalDecomposition().solve(moment);
+  return count > 0.0 ? std::max(0.0, (squares - solution.dot(moment)) / count) : 0.0;
+}
+
+/// A training that ended early above the error of a linear model is run again from other weights.
+constexpr std::size_t kMaxStarts = 3;
+
+std::uint64_t seed_of_start(std::uint64_t seed, std::size_t start) {
+  return start == 0 ? seed : Random(~seed + start).bits();
+}
+
+/// The part that the three fits have in common.
+/// @param put_initial (weights, random) sets the weights of a start
 template <class PutInitial>
-std::pair<TrainedNetwork, Material> train(const Job& job, const TrainingData& data,
-                                          const FitContext& context,
-                                          const PutInitial& put_initial) {
+Outcome train(const Job& job, const TrainingData& data, const FitContext& context,
+              const PutInitial& put_initial) {
   check(job.training);
   check(job.windows);
   check_fits_a_file(job.network, job.member.of);
   report_progress(context.progress, 0.0, fmt::format("fitting {}", job.family));
-  Material material = prepare(data, job.windows, job.embargo, context);
+  Outcome outcome{.network = {}, .material = prepare(data, job.windows, job.embargo, context)};
+  const WindowSet& training = outcome.material.training;
   NetworkTrainer trainer(job.network, job.training);
   require_memory({.what = "the training",
-                  .bytes = trainer.bytes(material.training.steps, material.training.starts.size()),
+                  .bytes = trainer.bytes(training.steps, training.starts.size()),
                   .advice = "Take fewer or smaller layers, shorter windows or smaller batches."});
-  std::vector<float> weights(job.network.parameter_count(), 0.0F);
-  put_initial(weights.data());
-  const std::string recipe = recipe_of(job.family, job.network, job.training, material.training,
-                                       material.validation, context.seed) +
-                             job.member.name;
-  if (!job.member.finished.empty()) return {finished_network(job), std::move(material)};
-  TrainedNetwork trained = train_network(trainer, job.training, material.training,
-                                         material.validation, std::move(weights), recipe, context);
-  return {std::move(trained), std::move(material)};
+  if (!job.member.finished.empty()) {
+    outcome.network = finished_network(job);
+    return outcome;
+  }
+  const auto recipe_of_start = [&](std::size_t start) {
+    return recipe_of(job.family, job.network, job.training, training, outcome.material.validation,
+                     seed_of_start(context.seed, start)) +
+           job.member.name;
+  };
+  std::size_t resumed = 0;  // the start that the checkpoint is of
+  for (std::size_t start = 1; context.resume != nullptr && start < kMaxStarts; ++start)
+    if (context.resume->recipe == recipe_of_start(start)) resumed = start;
+  outcome.linear_loss = linear_loss(training);
+  for (std::size_t start = 0; start < kMaxStarts; ++start) {
+    FitContext own = context;
+    own.seed = seed_of_start(context.seed, start);
+    if (start != resumed) own.resume = nullptr;
+    std::vector<float> weights(job.network.parameter_count(), 0.0F);
+    Random random(own.seed);
+    put_initial(weights.data(), random);
+    TrainedNetwork trained =
+        train_network(trainer, job.training, training, outcome.material.validation,
+                      std::move(weights), recipe_of_start(start), own);
+    const double loss = trainer.loss(trained.weights, training);
+    const bool ended_early = !trained.end.empty();
+    if (start == 0 || loss < outcome.training_loss) {
+      outcome.network = std::move(trained);
+      outcome.training_loss = loss;
+    }
+    outcome.starts = start + 1;
+    if (!ended_early || !is_worse_than_linear(outcome)) break;
+  }
+  return outcome;
 }
 
 /// Dense layers in series, the last one linear with one output.
@@ -280,22 +362,21 @@ Trained<typename Way::Family> train_recurrent(const TrainingData& data,
                 .member = member};
   const TrainingNetwork& network = job.network;
   const std::size_t depth = options.layers.size();
-  auto [trained, material] = train(job, data, context, [&](float* weights) {
-    Random random(context.seed);
+  Outcome outcome = train(job, data, context, [&](float* weights, Random& random) {
     for (std::size_t l = 0; l < depth; ++l)
       put_layer(Way::kInitial(network.layers()[l].inputs, network.layers()[l].units, random),
                 network, l, weights);
     put_initial_dense(network, depth, random, weights);
   });
   typename Way::Family::Parameters parameters;
-  parameters.scaling = material.scaling;
+  parameters.scaling = outcome.material.scaling;
   for (std::size_t l = 0; l < depth; ++l)
-    parameters.layers.push_back(Way::kTake(network, l, trained.weights.data()));
+    parameters.layers.push_back(Way::kTake(network, l, outcome.network.weights.data()));
   for (std::size_t l = depth; l < network.layers().size(); ++l)
-    parameters.head.push_back(dense_layer(network, l, trained.weights.data()));
+    parameters.head.push_back(dense_layer(network, l, outcome.network.weights.data()));
   parameters.sample_period_s = 1.0 / data.sample_rate_Hz;
   parameters.warm_up_samples = options.windows.length;
-  return result_of<typename Way::Family>(std::move(parameters), std::move(trained), material, data,
+  return result_of<typename Way::Family>(std::move(parameters), std::move(outcome), data,
                                          options.training.epochs);
 }
 
@@ -319,16 +400,14 @@ Trained<Mlp> train_mlp(const TrainingData& data, const MlpOptions& options,
                 .windows = {.length = 1, .stride = 1, .burn_in = 0},
                 .embargo = static_embargo(data),
                 .member = member};
-  auto [trained, material] = train(job, data, context, [&](float* weights) {
-    Random random(context.seed);
+  Outcome outcome = train(job, data, context, [&](float* weights, Random& random) {
     put_initial_dense(job.network, 0, random, weights);
   });
   Mlp::Parameters parameters;
-  parameters.scaling = material.scaling;
+  parameters.scaling = outcome.material.scaling;
   for (std::size_t l = 0; l < job.network.layers().size(); ++l)
-    parameters.layers.push_back(dense_layer(job.network, l, trained.weights.data()));
-  return result_of<Mlp>(std::move(parameters), std::move(trained), material, data,
-                        options.training.epochs);
+    parameters.layers.push_back(dense_layer(job.network, l, outcome.network.weights.data()));
+  return result_of<Mlp>(std::move(parameters), std::move(outcome), data, options.training.epochs);
 }
 
 template <class Family>

@@ -142,6 +142,10 @@ struct RecurrentOptions {
 /// Initial weights: Glorot uniform; He normal before relu and elu; recurrent ones orthogonal;
 /// forget bias 1. Windows lie within one record and contain only finite inputs.
 ///
+/// A training that ends early with an RMSE on the training windows above 1.1 times that of a linear model is
+/// run again from other initial weights, at most three times in all; the network of the least such RMSE
+/// remains, and a note reports it if it is still above.
+///
 /// Source: papers 001 and 004, specification 3.2 and 3.4. Deterministic for a seed, for any
 /// number of threads. A loss that explodes (a million times that of a constant, or not finite)
 /// ends the training; the best weights so far are kept and a note reports it.

@@ -50,8 +50,9 @@ ReportSection ranking_section(const Results& results, Role split) {
                           results.unit),
       .tables = {std::move(table)}};
   for (const Ranking& ranking : results.rankings)
-    if (ranking.split == split && ranking.common_samples != ranking.scored_samples)
-      section.text += fmt::format(" {}", ranking_note(ranking));
+    if (ranking.split == split)
+      if (const std::string note = ranking_note(ranking); !note.empty()) section.text += " " + note;
+  for (const std::string& warning : results.warnings) section.text += " " + warning + ".";
   if (!ranked.others.empty()) {
     ReportTable others{
         .title = "Not in the ranking", .headings = {"model", "why"}, .rows = {}, .is_words = true};

@@ -50,6 +50,25 @@ TEST(FitLinear, RecoversASpringAndLeavesRatesOut) {
   EXPECT_TRUE(fitted.notes.empty());
 }
 
+TEST(FitLinear, WarnsWhereSlopesOfRatesWouldReduceTheError) {
+  const auto target = [](double friction) {
+    return
+        [friction](Row x) { return 350.0 * x[0] + friction * x[1] + 0.05 * std::sin(1e4 * x[0]); };
+  };
+  const auto notes_of = [&](double friction, bool rates) {
+    return fit_linear(training_data_of(deflection_and_rate(), oscillation(500), target(friction)),
+                      {.rates = rates})
+        .notes;
+  };
+  const auto notes = notes_of(2.0, false);
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_TRUE(notes.front().starts_with("warning: linear has no slope over rates"))
+      << notes.front();
+  EXPECT_NE(notes.front().find("--set rates=true"), std::string::npos) << notes.front();
+  EXPECT_TRUE(notes_of(2.0, true).empty());
+  EXPECT_TRUE(notes_of(0.0, false).empty());
+}
+
 TEST(FitLinear, ReportsTheStiffnessWithUnitAndError) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(500), [](Row x) {
     return 0.7 + 350.0 * x[0] + 0.01 * std::sin(1e4 * x[0]);

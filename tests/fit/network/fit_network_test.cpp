@@ -3,6 +3,7 @@
 #include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -44,6 +45,26 @@ TrainingData delayed_sines(std::size_t records, std::size_t samples, std::size_t
     data.sequences.push_back(std::move(sequence));
   }
   return data;
+}
+
+// A step that is too long throws the weights to where every unit is off; the training then ends at once.
+TEST(FitMlp, TrainsAgainWhereItEndedAboveALinearModelAndReportsIt) {
+  const TrainingData data = delayed_sines(5, 300, 0);  // the target is linear in the input
+  MlpOptions options{.layers = {3}, .training = {.epochs = 20, .batch = 8, .learning_rate = 3.0}};
+  options.training.patience = 1;
+  const auto fitted = fit_mlp(data, options);
+  const auto has_note = [&](const std::string& part) {
+    return std::ranges::any_of(fitted.notes, [&](const std::string& note) {
+      return note.find(part) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(has_note("trained from 3 starts"));
+  EXPECT_TRUE(
+      has_note("warning: on its own training data the network is worse than a linear model"));
+  options.training = {.epochs = 200, .batch = 8, .learning_rate = 1e-2};
+  options.activation = Activation::linear;
+  for (const std::string& note : fit_mlp(data, options).notes)
+    EXPECT_EQ(note.find("linear model"), std::string::npos) << note;
 }
 
 RecurrentOptions small_memory() {
