@@ -12,6 +12,7 @@
 
 #include "check/checker.hpp"
 #include "fit/common/guards.hpp"
+#include "fit/common/leak.hpp"
 #include "numerics/parallel.hpp"
 #include "numerics/reversals.hpp"
 #include "torsio/data/load.hpp"
@@ -78,6 +79,7 @@ void Checker::run_checks(bool with_warnings) {
   check_sign();
   if (with_warnings) {
     check_change();
+    check_position();
     check_columns();
     check_excitation();
   }
@@ -154,15 +156,38 @@ void Checker::check_excitation() {
 
 void Checker::check_leak() {
   const std::string leak = leak_ ? *leak_ : find_leak(dataset_, spec_);
-  if (leak.empty()) {
+  const std::vector<std::string> others = computed_from();
+  if (leak.empty() && others.empty()) {
     add(Verdict::pass, "leak", "", "the target was not computed from an input");
-  } else {
+  } else if (!leak.empty()) {
     add(Verdict::fail, "leak", "",
         leak.starts_with(kTruthPrefix)
             ? fmt::format("{} is a quantity of the simulation that no sensor measures", leak)
             : fmt::format("{} was computed from {}", dataset_.target, leak),
-        "Leave it out of --inputs: a model would learn the formula, not the spring.");
+        leak_advice(dataset_, spec_, leak));
   }
+  for (const std::string& channel : others)
+    add(Verdict::warn, "leak", "",
+        fmt::format("{} is {} times a constant, within their digits: it was not measured",
+                    dataset_.target, channel),
+        "A torque of a motor current contains the friction of motor and gear. Record one with a "
+        "torque "
+        "sensor.");
+}
+
+/// Channels besides the inputs that the target was computed from.
+std::vector<std::string> Checker::computed_from() const {
+  std::vector<std::string> found;
+  if (dataset_.records.empty()) return found;
+  const Recording& first = dataset_.records.front().recording;
+  for (const Channel& channel : first.channels())
+    if (may_be_target(first, channel) &&
+        std::ranges::all_of(
+            dataset_.records,
+            [&](const DatasetRecord& record) { return record.recording.has(channel.name); }) &&
+        is_straight_line(dataset_, channel.name))
+      found.push_back(channel.name);
+  return found;
 }
 
 // The guard acts on features, so features are compared; unusable recordings have failed before.

@@ -109,12 +109,14 @@ void Checker::check_saturation() {
     for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
       const Extent span = extent_of(channel.values);
       if (!(span.width() > 0.0)) return;
+      const auto returning = find_returning_value(channel, kSpikeShare * span.width());
       // A motion that turns within the last of few codes rests there, too.
       const double by_code = kCodesAtATurn * finest_step(channel) / span.width();
       for (const double extreme : {span.lowest, span.highest}) {
         const auto count = static_cast<double>(std::ranges::count(channel.values, extreme));
         const double share = count / static_cast<double>(channel.values.size());
         if (share < std::max(kSaturatedShare, by_code) ||
+            (returning && returning->value == extreme) ||
             approaches_gradually(channel, extreme, span) || is_turn(r, channel, extreme))
           continue;
         add(Verdict::warn, "saturation", recording.name(),
@@ -125,6 +127,7 @@ void Checker::check_saturation() {
             ranges_where(channel, [&](double value) { return value == extreme; }));
       }
     });
+    for_each_record([&](std::size_t r) { check_limit(r); });
   });
 }
 

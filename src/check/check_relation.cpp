@@ -63,7 +63,7 @@ void Checker::check_units() {
   pass_unless_found("units", "the recordings agree", [&] {
     for_each_record([&](std::size_t r) {
       check_units_within(r);
-      if (spoiled_[r] == 0 && !changes_[r]) check_scale(r);
+      if (spoiled_[r] == 0 && !changes_[r] && !positions_[r]) check_scale(r);
       if (spoiled_[r] == 0) check_twist(r);
     });
     compare_slopes();
@@ -171,7 +171,10 @@ void Checker::check_delay() {
   for_each_record([&](std::size_t r) {
     if (spoiled_[r] != 0 || changes_[r] || check_sides(r)) return;
     const auto delay = estimate_delay(pairs_[r], rate);
-    if (delay && (is_late(*delay, rate) || is_early(*delay, rate)))
+    const auto course = delay ? find_lag_course(pairs_[r], rate, *delay) : std::nullopt;
+    if (course)
+      report_clocks(r, *course);
+    else if (delay && (is_late(*delay, rate) || is_early(*delay, rate)))
       report_delay(r, *delay);
     else
       shortest_of_s[r] = delay ? delay->shortest_s : HUGE_VAL;
@@ -201,6 +204,18 @@ bool Checker::check_sides(std::size_t r) {
                   1e3 * std::abs(sides->lateness_s), is_first ? sources_[1] : sources_[0]),
       "The difference of two angles needs both at the same time: check how they are sampled.");
   return true;
+}
+
+void Checker::report_clocks(std::size_t r, const LagCourse& course) {
+  add(Verdict::warn, "delay", dataset_.records[r].recording.name(),
+      fmt::format("{} comes later by {:.3g} ms in each second, by {:.0f} ms in all: two clocks of "
+                  "different "
+                  "speed",
+                  course.per_second > 0.0 ? dataset_.target : spec_.inputs.front(),
+                  1e3 * std::abs(course.per_second), 1e3 * std::abs(course.change_s)),
+      "Record both with one clock, or multiply the stamps of one of them before they are joined. A "
+      "constant "
+      "latency: does not remove it.");
 }
 
 void Checker::report_delay(std::size_t r, const Delay& delay) {
@@ -255,6 +270,8 @@ void Checker::check_sign() {
                     : fmt::format("Mapping: invert one of them with sign: -1 (channels: "
                                   "{{{}: {{from: ..., sign: -1}}}})",
                                   dataset_.target));
+          } else if (values[r] < kClearCorrelation && has_lost_sign(r)) {
+            continue;
           } else if (values[r] < kClearCorrelation && hardly_moves(r)) {
             add(Verdict::warn, "excitation", recording,
                 fmt::format("{} hardly moves more than its noise: neither sign nor delay can be "
@@ -334,6 +351,9 @@ void Checker::relate() {
   for_each_record([&](std::size_t r) {
     const Recording& recording = dataset_.records[r].recording;
     changes_[r] = find_relation_change(pairs_[r]);
+    if (recording.has(kJointAngle) &&
+        std::ranges::find(spec_.inputs, kJointAngle) == spec_.inputs.end())
+      positions_[r] = find_position_effect(pairs_[r], recording.channel(kJointAngle).values);
     if (order_of_difference(r) != 0)
       sides_[r] =
           relate_sides(recording.channel(sources_[0]).values, recording.channel(sources_[1]).values,

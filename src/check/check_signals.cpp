@@ -127,7 +127,11 @@ void Checker::check_spikes() {
       if (is_condition(recording, channel.name)) return;
       const double range = range_in_use(r, channel.name);
       const double least = std::max(kSpikeShare * range, 2.0 * finest_step(channel));
-      const std::vector<std::size_t> spikes = find_spikes(channel, least);
+      std::vector<std::size_t> spikes = find_spikes(channel, least);
+      if (const auto returning = find_returning_value(channel, least)) {
+        report_returning(r, channel, *returning);
+        std::erase_if(spikes, [&](std::size_t i) { return channel.values[i] == returning->value; });
+      }
       if (spikes.empty()) return;
       std::ranges::copy(spikes, std::back_inserter(spikes_[r]));
       add(Verdict::warn, "spikes", recording.name(),
@@ -139,6 +143,23 @@ void Checker::check_spikes() {
           "Check the bus for invalid telegrams, and the log for lost digits.", places_of(spikes));
     });
   });
+}
+
+void Checker::report_returning(std::size_t r, const Channel& channel,
+                               const ReturningValue& returning) {
+  const Recording& recording = dataset_.records[r].recording;
+  std::ranges::copy(returning.samples, std::back_inserter(spikes_[r]));
+  add(Verdict::warn, "spikes", recording.name(),
+      fmt::format(
+          "{} returns to exactly {:.6g} {} in {} single samples, far from their neighbours, the "
+          "first at t = {:.4g} s",
+          channel.name, returning.value, unit_label(channel.name), returning.samples.size(),
+          recording.time_s(returning.samples.front())),
+      fmt::format(
+          "An amplifier that has no measurement writes such a value. Mapping line that reads it as "
+          "not measured, as it is in the file: missing: [{:.9g}]",
+          returning.value),
+      places_of(returning.samples));
 }
 
 void Checker::check_repeats() {
@@ -250,6 +271,18 @@ void Checker::check_twist(std::size_t r) {
 void Checker::check_scale(std::size_t r) {
   const auto& sides = sides_[r];
   if (!sides || !has_wrong_scale(*sides)) return;
+  // No pair of gears has such a ratio, and an encoder hardly such a scale.
+  if (std::abs(sides->excess) < kScaleOfAGear) {
+    add(Verdict::warn, "position", dataset_.records[r].recording.name(),
+        fmt::format(
+            "apart from the deflection, {} depends on the angle of the joint as if {} moved {:.4g} "
+            "times as far as {}",
+            dataset_.target, sources_[0], 1.0 + sides->excess, sources_[1]),
+        "The weight of a link that bends the sensor looks like this, and so does a scale that is "
+        "wrong "
+        "by that share: turn the unloaded joint and compare the two angles.");
+    return;
+  }
   spoiled_[r] = 1;
   add(Verdict::fail, "units", dataset_.records[r].recording.name(),
       fmt::format("{} moves {:.4g} times as far as {}, apart from the deflection that {} explains",

@@ -13,6 +13,7 @@
 #include "check/relation_change.hpp"
 #include "check/signal_faults.hpp"
 #include "check/signal_pair.hpp"
+#include "check/torque_faults.hpp"
 #include "check/torque_relation.hpp"
 #include "torsio/check/check.hpp"
 #include "torsio/data/dataset.hpp"
@@ -48,6 +49,7 @@ class Checker {
     flips_.resize(pairs_.size());
     changes_.resize(pairs_.size());
     sides_.resize(pairs_.size());
+    positions_.resize(pairs_.size());
     spikes_.resize(pairs_.size());
   }
 
@@ -106,6 +108,9 @@ class Checker {
   void check_coding();
   void check_held();
   void check_switched_off();
+  [[nodiscard]] bool has_lost_sign(std::size_t r);
+  void check_limit(std::size_t r);
+  void check_position();
   void check_zeros();
   void take_out_other_inputs();
   void check_explanation();
@@ -113,9 +118,11 @@ class Checker {
   void check_resolution();
   void check_columns();
   [[nodiscard]] bool may_be_target(const Recording& recording, const Channel& channel) const;
+  [[nodiscard]] std::vector<std::string> computed_from() const;
   void check_noise();
   void check_noise_of(std::size_t r, const Channel& channel, double range);
   void check_spikes();
+  void report_returning(std::size_t r, const Channel& channel, const ReturningValue& returning);
   [[nodiscard]] bool hardly_moves(std::size_t r) const;
   void check_repeats();
   [[nodiscard]] bool check_cut(std::size_t r);
@@ -145,6 +152,7 @@ class Checker {
   [[nodiscard]] bool is_sign_flip(std::size_t r, const std::string& name, const Jump& jump) const;
   void check_delay();
   [[nodiscard]] bool check_sides(std::size_t r);
+  void report_clocks(std::size_t r, const LagCourse& course);
   void report_delay(std::size_t r, const Delay& delay);
   void check_sign();
   void report_flip(std::size_t r);
@@ -160,6 +168,7 @@ class Checker {
   [[nodiscard]] bool check_determination(const TrainingData& data);
   void check_range();
   [[nodiscard]] bool has_failed() const;
+  static constexpr const char* kJointAngle = "joint_angle_rad";
   static constexpr std::size_t kFewSamples = 100;
   static constexpr double kSaturatedShare = 0.005;
   static constexpr double kCodesAtATurn = 2.0;
@@ -179,6 +188,7 @@ class Checker {
   static constexpr double kSlopeRatio = 5.0;
   static constexpr double kSpeedHalfWindow_s = 0.05;
   static constexpr double kSpeedRatio = 2.0;
+  static constexpr double kScaleOfAGear = 0.03;
   static constexpr double kOffsetShare = 0.05;
   static constexpr double kZeroShare = 0.02;      ///< share of the range
   static constexpr double kMaxUnexplained = 0.5;  ///< share of the variance
@@ -213,9 +223,10 @@ class Checker {
   std::vector<std::uint8_t> coded_;             ///< by record: numbers of it are in another coding
   std::vector<std::vector<Rest>> stalls_;       ///< by record
   std::vector<std::optional<SignFlip>> flips_;  ///< by record
-  std::vector<std::optional<RelationChange>> changes_;  ///< by record
-  std::vector<std::optional<TwoSides>> sides_;          ///< by record
-  std::vector<std::vector<std::size_t>> spikes_;        ///< by record: samples
+  std::vector<std::optional<RelationChange>> changes_;    ///< by record
+  std::vector<std::optional<TwoSides>> sides_;            ///< by record
+  std::vector<std::optional<PositionEffect>> positions_;  ///< by record
+  std::vector<std::vector<std::size_t>> spikes_;          ///< by record: samples
   std::mutex adding_;
   std::vector<Finding> findings_;
 };

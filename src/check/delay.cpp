@@ -9,6 +9,7 @@
 
 #include "check/hysteresis_fit.hpp"
 #include "numerics/nnls.hpp"
+#include "numerics/reversals.hpp"
 #include "torsio/core/estimate.hpp"
 
 namespace torsio {
@@ -26,6 +27,9 @@ constexpr double kEarlyRest = 0.01;
 constexpr double kHeldOutShare = 0.6;
 constexpr std::size_t kLeastParts = 3;
 constexpr double kShortest_s = 8e-3;
+constexpr double kLeastChange_s = 0.012;
+constexpr double kCourseShare = 0.3;  ///< share of what a constant lag leaves
+constexpr int kCourseSteps = 8;
 constexpr auto kDelayHinges = std::to_array<double>({-0.5, 0.0, 0.5});  // the input is scaled
 constexpr std::size_t kDelayStops = 20;
 constexpr double kSmallestStop = 0.004;  ///< share of half the range
@@ -35,6 +39,7 @@ constexpr Eigen::Index kFree = 4 + static_cast<Eigen::Index>(kDelayHinges.size()
 constexpr Eigen::Index kColumns =
     kFree + static_cast<Eigen::Index>(kDelayStops + kLoadedStops.size() + kRelaxations_s.size());
 constexpr std::size_t kParts = 4;
+constexpr std::size_t kStrokesOfADrift = 5;
 constexpr double kSpeedHalfWindow_s = 0.02;
 constexpr double kScaleShare = 0.1;
 constexpr double kScaleRest = 2e-3;  ///< a torque that changed its gain leaves more
@@ -84,6 +89,7 @@ Eigen::MatrixXd spring_columns(const std::vector<double>& input,
   std::array<double, kRelaxations_s.size()> follow{};
   for (std::size_t k = 0; k < follow.size(); ++k)
     follow[k] = -std::expm1(-1.0 / (kRelaxations_s[k] * sample_rate_Hz));
+  const bool drifts = count_reversals(input) >= kStrokesOfADrift;
   Eigen::MatrixXd columns(static_cast<Eigen::Index>(samples.size()), kColumns);
   std::array<double, kDelayStops> stops{};
   std::array<double, kRelaxations_s.size()> slow{};
@@ -102,7 +108,8 @@ Eigen::MatrixXd spring_columns(const std::vector<double>& input,
     Eigen::Index column = 0;
     const auto put = [&](double value) { columns(row, column++) = value; };
     put(1.0), put(last), put(last * last * last);
-    put(static_cast<double>(row) / static_cast<double>(columns.rows()) - 0.5);
+    // In a motion of few strokes a drift and a late torque are alike.
+    put(drifts ? static_cast<double>(row) / static_cast<double>(columns.rows()) - 0.5 : 0.0);
     for (const double hinge : kDelayHinges) put(std::max(last - hinge, 0.0));
     for (const double stop : stops) put(stop);
     for (const std::size_t k : kLoadedStops) put(stops[k] * std::abs(last));
@@ -181,16 +188,44 @@ class Search {
     return longest_ > 0 && samples_.size() >= kFewestSamples;
   }
 
-  [[nodiscard]] Delay run() {
-    columns_ = spring_columns(pair_.input, samples_, sample_rate_Hz_);
-    line_ = columns_.col(1).array() - columns_.col(1).mean();
-    for (std::size_t p = 0; p < kParts; ++p) {
-      const Eigen::Index begin = part_begin(p);
-      const auto rows = columns_.middleRows(begin, part_begin(p + 1) - begin);
-      products_[p] = rows.transpose() * rows;
+  /// A lag a + b t by Gauss and Newton: the target and t times the target change by their derivatives. Begins at a
+  /// constant lag.
+  [[nodiscard]] LagCourse run_course(double lag_s) {
+    prepare();
+    const Eigen::Index rows = columns_.rows();
+    Eigen::MatrixXd columns(rows, kColumns + 2);
+    columns.rightCols(kColumns) = columns_;
+    std::vector<std::uint8_t> is_free(static_cast<std::size_t>(kColumns + 2), 0);
+    std::fill_n(is_free.begin(), 2 + kFree, std::uint8_t{1});
+    const Eigen::VectorXd at_s = times_s();
+    LagCourse course{.at_middle_s = lag_s};
+    for (int step = 0; step < kCourseSteps; ++step) {
+      Eigen::VectorXd target(rows);
+      for (Eigen::Index n = 0; n < rows; ++n) {
+        const double late_s = course.at_middle_s + course.per_second * at_s(n);
+        const auto [value, rate] = target_at(n, late_s);
+        target(n) = value, columns(n, 0) = rate, columns(n, 1) = rate * at_s(n);
+      }
+      target.array() -= target.mean();
+      if (line_.dot(target) < 0.0) target = -target, columns.leftCols<2>() *= -1.0;
+      NormalEquations equations(static_cast<std::size_t>(kColumns + 2));
+      const Eigen::MatrixXd product = columns.transpose() * columns;
+      const Eigen::VectorXd projection = columns.transpose() * target;
+      equations.product.values.assign(product.data(), product.data() + product.size());
+      equations.projection.assign(projection.begin(), projection.end());
+      equations.square = target.squaredNorm();
+      const std::vector<double> found = non_negative_least_squares(equations, is_free).coefficients;
+      course.unexplained = equations.error(found) / equations.square;
+      course.at_middle_s -= found[0];
+      course.per_second -= found[1];
     }
-    const auto step = std::max<std::ptrdiff_t>(
-        1, static_cast<std::ptrdiff_t>(std::round(kCoarseStep_s * sample_rate_Hz_)));
+    course.change_s = course.per_second * (at_s(rows - 1) - at_s(0));
+    return course;
+  }
+
+  [[nodiscard]] Delay run() {
+    prepare();
+    const auto step = coarse_step();
     std::vector<std::pair<std::ptrdiff_t, double>> shares;
     for (std::ptrdiff_t lag = -(longest_ / step) * step; lag <= longest_; lag += step)
       shares.emplace_back(lag, fit(lag).unexplained());
@@ -227,6 +262,37 @@ class Search {
   }
 
  private:
+  [[nodiscard]] std::ptrdiff_t coarse_step() const {
+    return std::max<std::ptrdiff_t>(
+        1, static_cast<std::ptrdiff_t>(std::round(kCoarseStep_s * sample_rate_Hz_)));
+  }
+  /// Times of the samples, from the middle one.
+  [[nodiscard]] Eigen::VectorXd times_s() const {
+    Eigen::VectorXd at_s(columns_.rows());
+    const auto middle = static_cast<double>(samples_[samples_.size() / 2]);
+    for (Eigen::Index n = 0; n < at_s.size(); ++n)
+      at_s(n) =
+          (static_cast<double>(samples_[static_cast<std::size_t>(n)]) - middle) / sample_rate_Hz_;
+    return at_s;
+  }
+  /// The target and its derivative so long after a sample, interpolated linearly.
+  [[nodiscard]] std::pair<double, double> target_at(Eigen::Index n, double late_s) const {
+    const auto longest = static_cast<double>(longest_ - 1);
+    const double shift = std::clamp(late_s * sample_rate_Hz_, -longest, longest);
+    const double at = static_cast<double>(samples_[static_cast<std::size_t>(n)]) + shift;
+    const auto before = static_cast<std::size_t>(std::floor(at));
+    const double step = pair_.target[before + 1] - pair_.target[before];
+    return {pair_.target[before] + (at - std::floor(at)) * step, step * sample_rate_Hz_};
+  }
+  void prepare() {
+    columns_ = spring_columns(pair_.input, samples_, sample_rate_Hz_);
+    line_ = columns_.col(1).array() - columns_.col(1).mean();
+    for (std::size_t p = 0; p < kParts; ++p) {
+      const Eigen::Index begin = part_begin(p);
+      const auto rows = columns_.middleRows(begin, part_begin(p + 1) - begin);
+      products_[p] = rows.transpose() * rows;
+    }
+  }
   [[nodiscard]] Eigen::Index part_begin(std::size_t p) const {
     return columns_.rows() * static_cast<Eigen::Index>(p) / static_cast<Eigen::Index>(kParts);
   }
@@ -252,6 +318,17 @@ std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz) {
   Search search(pair, sample_rate_Hz);
   if (!search.is_possible()) return {};
   return search.run();
+}
+
+std::optional<LagCourse> find_lag_course(const Pair& pair, double sample_rate_Hz,
+                                         const Delay& constant) {
+  Search search(pair, sample_rate_Hz);
+  if (!search.is_possible()) return {};
+  const LagCourse course = search.run_course(constant.lag_s);
+  const bool is_clear = std::abs(course.change_s) >= kLeastChange_s &&
+                        std::abs(course.change_s) <= kLongest_s &&
+                        course.unexplained <= kCourseShare * constant.unexplained;
+  return is_clear ? std::optional(course) : std::nullopt;
 }
 
 bool is_late(const Delay& delay, double sample_rate_Hz) {

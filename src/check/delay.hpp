@@ -33,6 +33,17 @@ struct Delay {
 /// Lags up to 0.6 s are searched. Empty if there are too few samples.
 [[nodiscard]] std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz);
 
+/// A lag that grows in time, as between two clocks.
+struct LagCourse {
+  double at_middle_s = 0.0;  ///< in the middle of the recording
+  double per_second = 0.0;
+  double change_s = 0.0;  ///< over the whole recording
+  double unexplained = 1.0;
+};
+/// Empty unless it changes by at least 12 ms, and leaves at most 30 % of what a constant lag leaves.
+[[nodiscard]] std::optional<LagCourse> find_lag_course(const Pair& pair, double sample_rate_Hz,
+                                                       const Delay& constant);
+
 /// Whether a shift explains a good part of what is unexplained without it, also in parts of the
 /// recording that were not used for the fit. Late: at least 8 ms; the shift explains 30 % of it, of a long delay 75 %. Early: the
 /// input is late; the shift explains 70 % of it, and hardly anything else remains.

@@ -24,15 +24,15 @@ constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
 constexpr double kSlopeChange = 0.12;
 constexpr double kSmallTorqueRest = 0.01;  ///< share of the torque's variance
 constexpr std::size_t kManyReversals = 5;
-constexpr double kPartShare = 0.2;  ///< share of the input's range that each part passes through
-constexpr double kEqualSpeedShare = 0.5;  ///< share of what is moved through twice
+constexpr double kPartShare = 0.2;   ///< share of the input's range that each part passes through
 constexpr double kInputStep = 0.05;  ///< share of the input's range within which inputs are equal
+constexpr auto kSettlings =
+    std::to_array<double>({0.05, 0.15, 0.4});  // time constants of a warm-up over the duration
 constexpr double kAnySpeed = 0.0;
-constexpr double kSpeedsOfADrift = 1.5;  ///< equal within this factor
 constexpr double kSpeedsOfAMotion = 3.0;
 constexpr std::size_t kOffParts = 20;  ///< parts of a recording that are looked at
 constexpr std::size_t kMaxOff = 6;     ///< parts
-constexpr double kOffExpected = 0.2;   ///< share of the target's range
+constexpr double kOffExpected = 0.1;   ///< share of the target's range
 constexpr double kOffPassed = 0.1;     ///< share of what is expected
 
 /// With a friction that depends on the load: the stops times the scaled input. Without them its two branches would be
@@ -76,10 +76,6 @@ class EqualMotion {
     return number;
   }
 
- private:
-  static constexpr int kLevels = 5;  ///< to which a stop operator is rounded
-  static constexpr int kSpeeds = 32;
-
   /// By steps of a factor of what the input moves in ten samples.
   [[nodiscard]] int speed_level(Eigen::Index row) const {
     constexpr Eigen::Index kReach = 5;
@@ -91,6 +87,10 @@ class EqualMotion {
                             : 1 + static_cast<int>(std::log(moved / kSlowest) / std::log(speeds_));
   }
 
+ private:
+  static constexpr int kLevels = 5;  ///< to which a stop operator is rounded
+  static constexpr int kSpeeds = 32;
+
   const Eigen::MatrixXd& columns_;
   double speeds_;
   Eigen::RowVectorXd largest_;
@@ -100,21 +100,19 @@ class EqualMotion {
 struct Difference {
   double offset = 0.0;
   double slope = 0.0;
-  double share = 0.0;  ///< over so much of the input's range they were compared
 };
 
 /// Late minus early target at equal input after equal motion; empty if too little of the range is met in both.
 /// @param slope of the target over z, by which unequal inputs are compared
 std::optional<Difference> compare_at_equal_motion(const Eigen::MatrixXd& columns,
                                                   const Eigen::VectorXd& target, double slope,
-                                                  Eigen::Index early_end, Eigen::Index late_begin,
-                                                  double speeds, double least_share) {
+                                                  Eigen::Index early_end, Eigen::Index late_begin) {
   struct Group {
     double count = 0.0, z = 0.0, target = 0.0;
     void add(double z_of_sample, double value) { count += 1.0, z += z_of_sample, target += value; }
   };
   std::map<int, std::array<Group, 2>> groups;
-  const EqualMotion motion(columns, columns.cols() - kStaticColumns, speeds);
+  const EqualMotion motion(columns, columns.cols() - kStaticColumns, kAnySpeed);
   for (Eigen::Index i = 0; i < target.size(); ++i)
     if (i < early_end || i >= late_begin)
       groups[motion.number_of(i)][i < early_end ? 0 : 1].add(columns(i, 1), target(i));
@@ -133,10 +131,9 @@ std::optional<Difference> compare_at_equal_motion(const Eigen::MatrixXd& columns
     moment += weight * difference * row;
     steps.insert(static_cast<int>(std::floor(z / (2.0 * kInputStep))));
   }
-  const double share = kInputStep * static_cast<double>(steps.size());
-  if (share < least_share) return {};
+  if (kInputStep * static_cast<double>(steps.size()) < kPartShare) return {};
   const Eigen::Vector2d line = normal.ldlt().solve(moment);
-  return Difference{line(0), line(1), share};
+  return Difference{line(0), line(1)};
 }
 
 /// What one course over time (0 early, 1 late) of offset and slope explains of a rest.
@@ -167,9 +164,8 @@ class Course {
     const Eigen::Vector2d solution = normal.inverse() * moment;
     const double all = rest_.squaredNorm();
     if (!(all > 0.0)) return {};
-    return {std::max(0.0, 1.0 - solution.dot(moment) / all),
-            {solution(0), solution(1), 1.0},
-            course.mean()};
+    return {
+        std::max(0.0, 1.0 - solution.dot(moment) / all), {solution(0), solution(1)}, course.mean()};
   }
 
  private:
@@ -178,6 +174,15 @@ class Course {
   Eigen::VectorXd rest_;
   double unexplained_ = 1.0;
 };
+
+/// Whether the input moves most of the time: a spring that rests relaxes as a sensor settles.
+bool is_moving(const Eigen::MatrixXd& columns) {
+  const EqualMotion motion(columns, 0, kSpeedsOfAMotion);
+  Eigen::Index moving = 0;
+  for (Eigen::Index row = 0; row < columns.rows(); ++row)
+    if (motion.speed_level(row) > 0) ++moving;
+  return 2 * moving > columns.rows();
+}
 
 double range_of(const Eigen::VectorXd& values) { return values.maxCoeff() - values.minCoeff(); }
 
@@ -229,6 +234,13 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
   for (Eigen::Index i = 0; i < late.size(); ++i)
     late(i) = static_cast<double>(i) / static_cast<double>(late.size());
   Explained best = course.explained_by(late);
+  Eigen::VectorXd best_course = late;
+  for (const double settling :
+       is_moving(columns) ? std::span(kSettlings) : std::span<const double>()) {
+    const Eigen::VectorXd warming = 1.0 - (-late.array() / settling).exp();
+    if (const Explained explained = course.explained_by(warming); explained.share < best.share)
+      best = explained, best_course = warming;
+  }
   RelationChange change{.is_gradual = true};
   for (std::size_t k = 1; k < kCandidates; ++k) {
     const std::size_t split = size * k / kCandidates;
@@ -251,15 +263,11 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
       static_cast<Eigen::Index>(std::ranges::lower_bound(samples, change.sample) - samples.begin());
   const auto early_end = change.is_gradual ? count / 3 : split;
   const auto late_begin = change.is_gradual ? count - count / 3 : split;
-  auto difference =
-      compare_at_equal_motion(columns, target, slope, early_end, late_begin, kAnySpeed, kPartShare);
+  auto difference = compare_at_equal_motion(columns, target, slope, early_end, late_begin);
   if (difference && change.is_gradual) {
-    // A torque that depends on the speed changes with it, as in a chirp. Only its turning points are equally slow.
-    difference = compare_at_equal_motion(columns, target, slope, early_end, late_begin,
-                                         kSpeedsOfADrift, kEqualSpeedShare * difference->share);
-    if (!difference) return {};
-    // The middles of the first and the last third are two thirds of the recording apart.
-    difference->offset *= 1.5, difference->slope *= 1.5;
+    // From the means of the first and the last third to the whole course.
+    const double passed = best_course.tail(count / 3).mean() - best_course.head(count / 3).mean();
+    difference->offset /= passed, difference->slope /= passed;
   }
   if (!difference) {
     // Then a friction that depends on the load explains small differences as well.
@@ -286,35 +294,37 @@ std::optional<SwitchedOff> find_switched_off(const Pair& pair) {
   const Eigen::VectorXd target = at_samples(pair.target, samples);
   const Eigen::VectorXd curve = target - FixedColumns(columns).residual(target);
   const double range = extent_of(pair.target).width();
-  struct Part {
-    double expected = 0.0;
-    double passed = 0.0;
-    bool is_off = false;
-  };
-  std::array<Part, kOffParts> parts;
   const auto size = static_cast<std::size_t>(target.size());
   const auto begin_of = [&](std::size_t part) { return size * part / kOffParts; };
-  for (std::size_t k = 0; k < kOffParts; ++k) {
-    const auto begin = static_cast<Eigen::Index>(begin_of(k));
-    const Eigen::Index length = static_cast<Eigen::Index>(begin_of(k + 1)) - begin;
-    parts[k] = {.expected = range_of(curve.segment(begin, length)),
-                .passed = range_of(target.segment(begin, length))};
+  const auto range_in = [&](const Eigen::VectorXd& values, std::size_t part, std::size_t parts) {
+    const auto begin = static_cast<Eigen::Index>(begin_of(part));
+    return range_of(
+        values.segment(begin, static_cast<Eigen::Index>(begin_of(part + parts)) - begin));
+  };
+  struct Part {
+    double expected = 0.0;
+    bool is_off = false;
+  };
+  std::array<Part, kOffParts - 1> parts;  // with the next one
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    parts[k].expected = range_in(curve, k, 2);
     parts[k].is_off = parts[k].expected >= kOffExpected * range &&
-                      parts[k].passed <= kOffPassed * parts[k].expected;
+                      range_in(target, k, 2) <= kOffPassed * parts[k].expected;
   }
   const auto first = std::ranges::find(parts, true, &Part::is_off);
   if (first == parts.end()) return {};
   // As far as the target remains as quiet, also where the motion turns.
   SwitchedOff off;
   std::size_t begin = static_cast<std::size_t>(first - parts.begin());
-  std::size_t end = begin + 1;
-  const auto is_quiet = [&](const Part& part) {
-    return part.passed <= kOffPassed * first->expected;
+  std::size_t end = begin + 2;
+  const auto is_quiet = [&](std::size_t part) {
+    return range_in(target, part, 1) <= kOffPassed * first->expected;
   };
-  while (begin > 0 && is_quiet(parts[begin - 1])) --begin;
-  while (end < kOffParts && is_quiet(parts[end])) ++end;
-  const auto off_elsewhere = std::ranges::any_of(parts.begin() + static_cast<std::ptrdiff_t>(end),
-                                                 parts.end(), &Part::is_off);
+  while (begin > 0 && is_quiet(begin - 1)) --begin;
+  while (end < kOffParts && is_quiet(end)) ++end;
+  const auto off_elsewhere =
+      std::any_of(parts.begin() + static_cast<std::ptrdiff_t>(std::min(end, parts.size())),
+                  parts.end(), [](const Part& part) { return part.is_off; });
   if (end - begin > kMaxOff || off_elsewhere) return {};
   const auto begin_row = static_cast<Eigen::Index>(begin_of(begin));
   const auto end_row = static_cast<Eigen::Index>(begin_of(end));

@@ -17,9 +17,9 @@ struct RelationChange {
 };
 
 /// The torque is fitted by a static curve with hysteresis over the input (`hysteresis_columns`). If
-/// one step or one linear trend in time, of offset and slope, explains three quarters of what
+/// one step, one linear trend in time or one that settles, of offset and slope, explains three quarters of what
 /// remains, the joint or a sensor may have changed. Offset and slope of the change are those between
-/// early and late samples at equal input after equal motion, and at equal speed if it is gradual: what depends on the branch of the hysteresis
+/// early and late samples at equal input after equal motion: what depends on the branch of the hysteresis
 /// or on the load is equal in both. Only offsets above 5 % of the torque's range and slopes that change
 /// by more than 12 % are reported; empty if the torque does not follow the input or the motion does not
 /// reverse on both sides of the step. Where the late motion does not repeat the early one over a fifth of the input's
@@ -33,8 +33,8 @@ struct SwitchedOff {
   double passed = 0.0;    ///< range that the target passes through in it
   double expected = 0.0;  ///< the same elsewhere, at equal inputs and speeds
 };
-/// The recording is divided into twenty parts; in one the target passes through less than a tenth of what the curve with
-/// hysteresis passes through, and that is at least a fifth of the range of the target. The neighbours in which it is as
+/// The recording is divided into twenty parts; in two successive ones the target passes through less than a tenth of what the curve with
+/// hysteresis passes through, and that is at least a tenth of the range of the target. The neighbours in which it is as
 /// quiet belong to it. Empty if these are more than six, if it happens elsewhere, or if the target passes through as
 /// little elsewhere at equal inputs and speeds: then it is a backlash or a contact that opened.
 [[nodiscard]] std::optional<SwitchedOff> find_switched_off(const Pair& pair);

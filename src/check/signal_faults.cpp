@@ -197,6 +197,34 @@ std::vector<std::size_t> find_spikes(const Channel& channel, double least) {
   return spikes;
 }
 
+std::optional<ReturningValue> find_returning_value(const Channel& channel, double least) {
+  constexpr std::size_t kFewestReturns = 5;
+  constexpr std::size_t kLongestReturn = 3;
+  const std::vector<std::size_t> samples = new_samples(channel);
+  const auto value = [&](std::size_t k) { return channel.values[samples[k]]; };
+  Extent extent;
+  for (std::size_t k = 0; k < samples.size(); ++k) extent.include(value(k));
+  for (const double candidate : {0.0, extent.lowest, extent.highest}) {
+    ReturningValue found{.value = candidate, .samples = {}};
+    std::size_t returns = 0;
+    for (std::size_t begin = 1, end = 1; begin + 1 < samples.size(); begin = end) {
+      end = begin + 1;
+      if (value(begin) != candidate) continue;
+      while (end < samples.size() && value(end) == candidate) ++end;
+      if (end == samples.size() || end - begin > kLongestReturn) continue;
+      const double before = std::abs(value(begin - 1) - candidate);
+      const double after = std::abs(value(end) - candidate);
+      const double height = std::min(before, after);
+      if (!(height > least) || std::abs(value(end) - value(begin - 1)) > kNeighboursAgree * height)
+        continue;
+      ++returns;
+      for (std::size_t k = begin; k < end; ++k) found.samples.push_back(samples[k]);
+    }
+    if (returns >= kFewestReturns) return found;
+  }
+  return {};
+}
+
 std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& channels,
                                          std::size_t shortest) {
   if (channels.empty()) return {};
@@ -293,10 +321,10 @@ std::size_t held_rows(const Channel& channel) {
   const double usual = quantile(lengths, 0.5);
   if (usual < 2.0) return 0;
   std::erase_if(lengths, [&](double length) { return length > kLongRun * usual; });
-  const double slack = usual >= 4.0 ? 1.0 : 0.0;  // the clocks differ
+  const double slack = usual >= 3.0 ? 1.0 : 0.0;  // the clocks differ
   const auto of_one_length = std::ranges::count_if(lengths, [&](double length) {
     // Two equal measurements are one run.
-    return length >= usual - slack && (length <= usual + slack || length >= 2.0 * usual - slack);
+    return length >= usual - slack && (length <= usual + 1.0 || length >= 2.0 * usual - slack);
   });
   if (static_cast<double>(of_one_length) < kRunsOfOneLength * static_cast<double>(lengths.size()))
     return 0;

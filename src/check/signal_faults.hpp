@@ -37,6 +37,16 @@ struct Burst {
 /// the neighbours agree with each other and the signal around is quiet.
 [[nodiscard]] std::vector<std::size_t> find_spikes(const Channel& channel, double least);
 
+/// A value to which single samples return, far from their neighbours: what an amplifier writes instead of a measurement.
+struct ReturningValue {
+  double value = 0.0;
+  std::vector<std::size_t> samples;
+};
+/// The lowest, the highest value or 0, at least five times for at most three samples each.
+/// @param least difference from the neighbours
+[[nodiscard]] std::optional<ReturningValue> find_returning_value(const Channel& channel,
+                                                                 double least);
+
 /// A block of rows in which every channel has exactly the values of an earlier block.
 struct RepeatedBlock {
   std::size_t first = 0;

@@ -1,8 +1,12 @@
 // Sensors that write something else than their quantity: coded numbers, held values, a torque that is switched off.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <vector>
 
 #include "check/check_support.hpp"
 #include "torsio/data/mapping.hpp"
@@ -223,6 +227,126 @@ TEST(CheckSensors, DoNotTakeADriftForADelay) {
         channel.values[n] += 1e-4 * static_cast<double>(n);
   })));
   EXPECT_EQ(verdict_of(findings, "delay"), Verdict::pass) << text_of(findings);
+}
+
+TEST(CheckSensors, NameTheLimitOfAnAmplifierInItsNoise) {
+  Random random(3);
+  const auto clipped = [&](double limit_Nm) {
+    return findings_of(alone(changed(bench_recording("clipped"), [&](Channel& channel) {
+      if (channel.name != "torque_Nm") return;
+      for (double& value : channel.values)
+        value = std::clamp(value, -limit_Nm, limit_Nm) + 0.02 * random.normal();
+    })));
+  };
+  const auto findings = clipped(6.0);
+  ASSERT_EQ(verdict_of(findings, "saturation"), Verdict::warn) << text_of(findings);
+  EXPECT_NE(first_of(findings, "saturation").message.find("within its noise"), std::string::npos);
+  EXPECT_EQ(verdict_of(clipped(1e3), "saturation"), Verdict::pass);
+}
+
+TEST(CheckSensors, FailForTheAmountOfATorque) {
+  const auto findings = findings_of(alone(changed(bench_recording("amount"), [](Channel& channel) {
+    if (channel.name == "torque_Nm")
+      for (double& value : channel.values) value = std::abs(value);
+  })));
+  ASSERT_EQ(verdict_of(findings, "sign"), Verdict::fail) << text_of(findings);
+  EXPECT_NE(first_of(findings, "sign").message.find("the amount of a torque"), std::string::npos);
+}
+
+TEST(CheckSensors, NameAValueThatIsWrittenInsteadOfAMeasurement) {
+  for (const double written : {0.0, 500.0}) {
+    const auto findings = findings_of(alone(changed(bench_recording("gone"), [&](Channel& channel) {
+      if (channel.name == "torque_Nm")
+        for (std::size_t n = 40; n < channel.values.size(); n += 97) channel.values[n] = written;
+    })));
+    ASSERT_EQ(verdict_of(findings, "spikes"), Verdict::warn) << text_of(findings);
+    const std::string& advice = first_of(findings, "spikes").advice;
+    EXPECT_NE(advice.find(fmt::format("missing: [{:g}]", written)), std::string::npos) << advice;
+  }
+}
+
+/// The bench with a joint that turns through more than half a turn.
+Recording turning(const std::function<double(double)>& more_Nm) {
+  const Recording bench = bench_recording("turning", {.samples = 16000});
+  std::vector<double> angle;
+  for (std::size_t n = 0; n < bench.size(); ++n)
+    angle.push_back(2.0 * std::sin(2.1e-3 * static_cast<double>(n)));
+  const std::vector<double> joint = bench.channel("joint_angle_rad").values;
+  return changed(bench, [&](Channel& channel) {
+    for (std::size_t n = 0; n < angle.size(); ++n)
+      channel.values[n] += channel.name == "torque_Nm" ? more_Nm(angle[n]) : angle[n] - joint[n];
+  });
+}
+
+TEST(CheckSensors, WarnOfATorqueThatFollowsTheAngleOfTheJoint) {
+  const auto bent = findings_of(alone(turning([](double q) { return 1.5 * std::cos(q); })));
+  ASSERT_EQ(verdict_of(bent, "position"), Verdict::warn) << text_of(bent);
+  const auto straight = findings_of(alone(turning([](double) { return 0.0; })));
+  EXPECT_EQ(verdict_of(straight, "position"), Verdict::pass) << text_of(straight);
+}
+
+TEST(CheckSensors, DistinguishTwoClocksFromADelay) {
+  const Recording bench = bench_recording("clocks", {.samples = 8000});
+  const std::vector<double> torque = bench.channel("torque_Nm").values;
+  const auto late = [&](double samples, double share) {
+    return findings_of(alone(changed(bench, [&](Channel& channel) {
+      if (channel.name != "torque_Nm") return;
+      for (std::size_t n = 0; n < torque.size(); ++n) {
+        const double at = (1.0 - share) * static_cast<double>(n) - samples;
+        channel.values[n] = torque[static_cast<std::size_t>(std::max(at, 0.0))];
+      }
+    })));
+  };
+  const auto two_clocks = late(0.0, 0.01);
+  ASSERT_EQ(verdict_of(two_clocks, "delay"), Verdict::warn) << text_of(two_clocks);
+  EXPECT_NE(first_of(two_clocks, "delay").message.find("two clocks"), std::string::npos)
+      << text_of(two_clocks);
+  const auto constant = late(40.0, 0.0);
+  ASSERT_EQ(verdict_of(constant, "delay"), Verdict::warn) << text_of(constant);
+  EXPECT_NE(first_of(constant, "delay").message.find(" ms after "), std::string::npos)
+      << text_of(constant);
+}
+
+TEST(CheckSensors, WarnOfAZeroThatWarmsUp) {
+  const auto findings = findings_of(alone(changed(
+      bench_recording("cold", {.friction_Nm = 0.2, .samples = 16000}), [](Channel& channel) {
+        if (channel.name == "torque_Nm")
+          for (std::size_t n = 0; n < channel.values.size(); ++n)
+            channel.values[n] += 3.0 * -std::expm1(-static_cast<double>(n) / 3000.0);
+      })));
+  EXPECT_EQ(verdict_of(findings, "change"), Verdict::warn) << text_of(findings);
+}
+
+TEST(CheckSensors, FindTorquesThatWereComputed) {
+  const auto rounded = [](double value) { return 1e-3 * std::round(1e3 * value); };
+  const Recording bench = bench_recording("computed");
+  const std::vector<double>& gear = bench.channel("gear_angle_rad").values;
+  const std::vector<double>& joint = bench.channel("joint_angle_rad").values;
+  for (const double share : {1.0, 0.2}) {  // unfiltered, low-passed
+    double torque_Nm = 300.0 * (gear[0] - joint[0]);
+    const auto findings = findings_of(alone(changed(bench, [&](Channel& channel) {
+      if (channel.name != "torque_Nm") return;
+      for (std::size_t n = 0; n < channel.values.size(); ++n) {
+        torque_Nm += share * (300.0 * (gear[n] - joint[n]) - torque_Nm);
+        channel.values[n] = rounded(torque_Nm);
+      }
+    })));
+    ASSERT_EQ(verdict_of(findings, "leak"), Verdict::fail) << share << text_of(findings);
+    EXPECT_NE(first_of(findings, "leak").advice.find("No sensor measured"), std::string::npos);
+  }
+  Recording with_current = bench;
+  Channel current{"motor_current_A", {}};
+  for (const double value : bench.channel("torque_Nm").values)
+    current.values.push_back(rounded(value / 11.0));
+  const auto findings = [&] {
+    with_current.add(current);
+    return findings_of(alone(changed(with_current, [&](Channel& channel) {
+      if (channel.name == "torque_Nm")
+        for (std::size_t n = 0; n < channel.values.size(); ++n)
+          channel.values[n] = rounded(11.0 * current.values[n]);
+    })));
+  }();
+  ASSERT_EQ(verdict_of(findings, "leak"), Verdict::warn) << text_of(findings);
 }
 
 TEST(CheckSensors, NameTheTestRecordingWhoseZeroIsAnother) {

@@ -16,8 +16,6 @@
 #include "data/mapping/canonical_channels.hpp"
 #include "data/mapping/needed_definitions.hpp"
 #include "data/recording_rows.hpp"
-#include "fit/common/passes.hpp"
-#include "numerics/least_squares.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/estimate.hpp"
 
@@ -80,76 +78,6 @@ std::vector<ChannelDefinition> known_definitions(const Dataset& dataset) {
         is_computable(dataset, definitions, channel.expression))
       definitions.push_back({std::string(channel.name), std::string(channel.expression)});
   return definitions;
-}
-
-/// Whether target = slope * input + offset to one part in 10^9 of the variance, over all fresh
-/// samples: no sensor is that accurate.
-bool is_straight_line(const Dataset& dataset, const std::string& input) {
-  double n = 0.0;
-  double mean_x = 0.0;
-  double mean_y = 0.0;
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (const DatasetRecord& record : dataset.records) {
-    const Channel& target = record.recording.channel(dataset.target);
-    const std::vector<double>& x_values = record.recording.channel(input).values;
-    for (std::size_t i = 0; i < x_values.size(); ++i) {
-      const double x = x_values[i];
-      const double y = target.values[i];
-      if (!target.is_fresh(i) || !std::isfinite(x) || !std::isfinite(y)) continue;
-      n += 1.0;
-      const double dx = x - mean_x;
-      const double dy = y - mean_y;
-      mean_x += dx / n;
-      mean_y += dy / n;
-      xx += dx * (x - mean_x);
-      xy += dx * (y - mean_y);
-      yy += dy * (y - mean_y);
-    }
-  }
-  constexpr double kUnexplained = 1e-9;
-  return n > 2.0 && xx > 0.0 && yy > 0.0 && yy - xy * xy / xx < kUnexplained * yy;
-}
-
-/// Whether the inputs together give the target in the same way: each source of a difference of two
-/// sensors alone is not a leak.
-bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
-  constexpr std::size_t kEnough = 2000;  // samples per record
-  constexpr double kUnexplained = 1e-9;
-  std::vector<double> rows;
-  std::vector<double> measured;
-  for (const DatasetRecord& record : dataset.records) {
-    const Recording& recording = record.recording;
-    const Channel& target = recording.channel(dataset.target);
-    FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
-    RecordingRows raw_rows(recording, pipeline.raw_inputs());
-    const std::size_t stride = recording.size() / kEnough + 1;
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      const std::span<const double> raw = raw_rows.at(i);
-      if (!all_finite(raw)) continue;
-      const std::span<const double> features = pipeline.step(raw);
-      if (i % stride != 0 || !target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
-      rows.push_back(1.0);
-      rows.insert(rows.end(), features.begin(), features.end());
-      measured.push_back(target.values[i]);
-    }
-  }
-  Matrix design(measured.size(), spec.inputs.size() + 1);
-  if (design.rows <= design.columns) return false;
-  design.values = std::move(rows);
-  const std::vector<double> plane = least_squares(design, measured).coefficients;
-  double mean = 0.0;
-  for (const double value : measured) mean += value / static_cast<double>(measured.size());
-  double total = 0.0;
-  double missed = 0.0;
-  for (std::size_t i = 0; i < measured.size(); ++i) {
-    double computed = 0.0;
-    for (std::size_t j = 0; j < plane.size(); ++j) computed += plane[j] * design(i, j);
-    missed += (measured[i] - computed) * (measured[i] - computed);
-    total += (measured[i] - mean) * (measured[i] - mean);
-  }
-  return missed < kUnexplained * total;
 }
 
 [[noreturn]] void refuse_missing(const Recording& recording, const std::string& channel,
@@ -223,32 +151,6 @@ std::vector<double> first_feature(const Recording& recording, const FeatureSpec&
     if (all_finite(raw)) values[i] = pipeline.step(raw).front();
   }
   return values;
-}
-
-std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
-  ++passes().leak_searches;
-  const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
-  for (const std::string& input : pipeline.raw_inputs())
-    if (input.starts_with(kTruthPrefix) ||
-        std::ranges::find(dataset.target_computed_from, input) !=
-            dataset.target_computed_from.end() ||
-        is_straight_line(dataset, input))
-      return input;
-  if (is_plane(dataset, spec)) return fmt::format("{}", fmt::join(spec.inputs, ", "));
-  return {};
-}
-
-std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool allow_leak) {
-  std::string leak = find_leak(dataset, spec);
-  if (!leak.empty() && !allow_leak)
-    throw UsageError({.place = leak,
-                      .problem = leak.starts_with(kTruthPrefix)
-                                     ? "no sensor measures this channel of a simulation"
-                                     : dataset.target + " was computed from this input: a model "
-                                                        "would learn the formula",
-                      .advice = "Leave it out of --inputs, or accept rows that are marked as leaks "
-                                "with --allow-leak."});
-  return leak;
 }
 
 }  // namespace torsio

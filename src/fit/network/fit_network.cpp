@@ -161,8 +161,9 @@ struct Outcome {
 };
 
 bool is_worse_than_linear(const Outcome& outcome) {
-  constexpr double kClearly = 1.21;  // an RMSE of 1.1 times
-  return outcome.training_loss > kClearly * outcome.linear_loss;
+  constexpr double kClearly = 1.21;     // an RMSE of 1.1 times
+  constexpr double kNegligible = 1e-6;  // an RMSE of a thousandth of the standard deviation
+  return outcome.training_loss > kClearly * outcome.linear_loss + kNegligible;
 }
 
 std::vector<std::string> notes_of(const Outcome& outcome, const TrainingData& data,

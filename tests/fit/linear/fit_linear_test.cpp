@@ -210,8 +210,9 @@ TEST(FitLinearCoulomb, ReportsWhenTheFrictionIsViscous) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(2000),
                                      [](Row x) { return 600.0 * x[0] + 2.0 * x[1]; });
   const auto fitted = fit_linear_coulomb(data, {});
-  ASSERT_EQ(fitted.notes.size(), 1U);
+  ASSERT_EQ(fitted.notes.size(), 2U);
   EXPECT_NE(fitted.notes[0].find("viscous"), std::string::npos);
+  EXPECT_NE(fitted.notes[1].find("--set rates=true"), std::string::npos) << fitted.notes[1];
 }
 
 TEST(FitLinearCoulomb, NeedsARateThatMoves) {
