@@ -46,12 +46,14 @@ Eigen::MatrixXd with_loaded_stops(const Eigen::MatrixXd& columns) {
 
 /// Whether input and target pass through a good part of their ranges in [begin, end), and the input
 /// reverses there.
-bool is_excited(const Pair& pair, std::size_t begin, std::size_t end, double input_width,
-                double target_width) {
-  const auto [input, target] = known_extents(pair, begin, end);
-  if (!(input.width() > kPartShare * input_width && target.width() > kPartShare * target_width))
-    return false;
-  return count_reversals(std::span(pair.input).subspan(begin, end - begin), 1) > 0;
+bool is_excited(const Pair& pair, Eigen::Index begin, Eigen::Index end) {
+  const auto first = static_cast<std::size_t>(begin);
+  const auto last = static_cast<std::size_t>(end);
+  const auto [all_input, all_target] = known_extents(pair);
+  const auto [input, target] = known_extents(pair, first, last);
+  return input.width() > kPartShare * all_input.width() &&
+         target.width() > kPartShare * all_target.width() &&
+         count_reversals(std::span(pair.input).subspan(first, last - first), 1) > 0;
 }
 
 /// Equal numbers are equal inputs after equal motion.
@@ -102,11 +104,97 @@ struct Difference {
   double slope = 0.0;
 };
 
-/// Late minus early target at equal input after equal motion; empty if too little of the range is met in both.
+/// What one course over time (0 early, 1 late) of offset and slope explains of a rest.
+struct Explained {
+  double share = 1.0;  ///< share of the variance of the rest that remains
+  Difference late_minus_early = {};
+};
+
+class Course {
+ public:
+  Course(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target)
+      : columns_(columns),
+        z_(columns.col(1)),
+        rest_(columns_.residual(target)),
+        unexplained_(share_of_variance(rest_, target)) {}
+
+  /// Share of the variance of the target that a fit without a change leaves.
+  [[nodiscard]] double unexplained() const { return unexplained_; }
+
+  [[nodiscard]] Explained explained_by(const Eigen::VectorXd& course) const {
+    Eigen::MatrixXd extra(rest_.size(), 2);
+    extra << columns_.residual(course), columns_.residual(course.cwiseProduct(z_));
+    const Eigen::Matrix2d normal = extra.transpose() * extra;
+    const Eigen::Vector2d moment = extra.transpose() * rest_;
+    const double determinant = normal.determinant();
+    if (!(determinant > 1e-9 * normal(0, 0) * normal(1, 1))) return {};
+    const Eigen::Vector2d solution = normal.inverse() * moment;
+    const double all = rest_.squaredNorm();
+    if (!(all > 0.0)) return {};
+    return {std::max(0.0, 1.0 - solution.dot(moment) / all), {solution(0), solution(1)}};
+  }
+
+ private:
+  FixedColumns columns_;
+  Eigen::VectorXd z_;
+  Eigen::VectorXd rest_;
+  double unexplained_ = 1.0;
+};
+
+/// Whether the input moves most of the time: a spring that rests relaxes as a sensor settles.
+bool is_moving(const Eigen::MatrixXd& columns) {
+  const EqualMotion motion(columns, 0, kSpeedsOfAMotion);
+  Eigen::Index moving = 0;
+  for (Eigen::Index row = 0; row < columns.rows(); ++row)
+    if (motion.speed_level(row) > 0) ++moving;
+  return 2 * moving > columns.rows();
+}
+
+/// The course that explains most, and where it steps.
+struct Candidate {
+  Explained explained = {};
+  Eigen::VectorXd course = {};
+  std::optional<Eigen::Index> split = {};  ///< first row of the late part; empty: gradual
+};
+
+/// A trend, warm-ups, and steps with a motion that reverses before and after.
+Candidate best_candidate(const Course& course, const Eigen::MatrixXd& columns,
+                         const Eigen::VectorXd& target) {
+  const Eigen::Index size = target.size();
+  Candidate best;
+  const auto take = [&](const Eigen::VectorXd& values, std::optional<Eigen::Index> split) {
+    const Explained explained = course.explained_by(values);
+    if (best.course.size() == 0 || explained.share < best.explained.share)
+      best = {explained, values, split};
+  };
+  const Eigen::VectorXd trend = Eigen::VectorXd::LinSpaced(size, 0.0, 1.0);
+  take(trend, {});
+  if (is_moving(columns))
+    for (const double settling : kSettlings) take(1.0 - (-trend.array() / settling).exp(), {});
+  const Pair moved{{columns.col(1).begin(), columns.col(1).end()}, {target.begin(), target.end()}};
+  for (std::size_t k = 1; k < kCandidates; ++k) {
+    const auto split = size * static_cast<Eigen::Index>(k) / static_cast<Eigen::Index>(kCandidates);
+    if (!is_excited(moved, 0, split) || !is_excited(moved, split, size)) continue;
+    Eigen::VectorXd step = Eigen::VectorXd::Ones(size);
+    step.head(split).setZero();
+    take(step, split);
+  }
+  return best;
+}
+
+/// End minus beginning of the course of a candidate, of the target at equal input after equal motion; empty if too little of
+/// the range is met early and late.
 /// @param slope of the target over z, by which unequal inputs are compared
 std::optional<Difference> compare_at_equal_motion(const Eigen::MatrixXd& columns,
                                                   const Eigen::VectorXd& target, double slope,
-                                                  Eigen::Index early_end, Eigen::Index late_begin) {
+                                                  const Candidate& candidate) {
+  // A course is compared between its first and its last third, and then extended to all of it.
+  const Eigen::Index third = target.size() / 3;
+  const Eigen::Index early_end = candidate.split.value_or(third);
+  const Eigen::Index late_begin = candidate.split.value_or(target.size() - third);
+  const double passed =
+      candidate.split ? 1.0
+                      : candidate.course.tail(third).mean() - candidate.course.head(third).mean();
   struct Group {
     double count = 0.0, z = 0.0, target = 0.0;
     void add(double z_of_sample, double value) { count += 1.0, z += z_of_sample, target += value; }
@@ -133,55 +221,7 @@ std::optional<Difference> compare_at_equal_motion(const Eigen::MatrixXd& columns
   }
   if (kInputStep * static_cast<double>(steps.size()) < kPartShare) return {};
   const Eigen::Vector2d line = normal.ldlt().solve(moment);
-  return Difference{line(0), line(1)};
-}
-
-/// What one course over time (0 early, 1 late) of offset and slope explains of a rest.
-struct Explained {
-  double share = 1.0;  ///< share of the variance of the rest that remains
-  Difference late_minus_early = {};
-  double mean = 0.0;  ///< mean value of the course
-};
-
-class Course {
- public:
-  Course(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target)
-      : columns_(columns),
-        z_(columns.col(1)),
-        rest_(columns_.residual(target)),
-        unexplained_(share_of_variance(rest_, target)) {}
-
-  /// Share of the variance of the target that a fit without a change leaves.
-  [[nodiscard]] double unexplained() const { return unexplained_; }
-
-  [[nodiscard]] Explained explained_by(const Eigen::VectorXd& course) const {
-    Eigen::MatrixXd extra(rest_.size(), 2);
-    extra << columns_.residual(course), columns_.residual(course.cwiseProduct(z_));
-    const Eigen::Matrix2d normal = extra.transpose() * extra;
-    const Eigen::Vector2d moment = extra.transpose() * rest_;
-    const double determinant = normal.determinant();
-    if (!(determinant > 1e-9 * normal(0, 0) * normal(1, 1))) return {};
-    const Eigen::Vector2d solution = normal.inverse() * moment;
-    const double all = rest_.squaredNorm();
-    if (!(all > 0.0)) return {};
-    return {
-        std::max(0.0, 1.0 - solution.dot(moment) / all), {solution(0), solution(1)}, course.mean()};
-  }
-
- private:
-  FixedColumns columns_;
-  Eigen::VectorXd z_;
-  Eigen::VectorXd rest_;
-  double unexplained_ = 1.0;
-};
-
-/// Whether the input moves most of the time: a spring that rests relaxes as a sensor settles.
-bool is_moving(const Eigen::MatrixXd& columns) {
-  const EqualMotion motion(columns, 0, kSpeedsOfAMotion);
-  Eigen::Index moving = 0;
-  for (Eigen::Index row = 0; row < columns.rows(); ++row)
-    if (motion.speed_level(row) > 0) ++moving;
-  return 2 * moving > columns.rows();
+  return Difference{line(0) / passed, line(1) / passed};
 }
 
 double range_of(const Eigen::VectorXd& values) { return values.maxCoeff() - values.minCoeff(); }
@@ -225,60 +265,26 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
   const Eigen::MatrixXd columns = hysteresis_columns(pair.input, samples);
   const Eigen::VectorXd target = at_samples(pair.target, samples);
   const Course course(with_loaded_stops(columns), target);
-  Pair coarse;
-  for (const std::size_t i : samples)
-    coarse.input.push_back(pair.input[i]), coarse.target.push_back(pair.target[i]);
-  const std::size_t size = coarse.input.size();
-  const auto [input, output] = known_extents(coarse);
-  Eigen::VectorXd late(target.size());
-  for (Eigen::Index i = 0; i < late.size(); ++i)
-    late(i) = static_cast<double>(i) / static_cast<double>(late.size());
-  Explained best = course.explained_by(late);
-  Eigen::VectorXd best_course = late;
-  for (const double settling :
-       is_moving(columns) ? std::span(kSettlings) : std::span<const double>()) {
-    const Eigen::VectorXd warming = 1.0 - (-late.array() / settling).exp();
-    if (const Explained explained = course.explained_by(warming); explained.share < best.share)
-      best = explained, best_course = warming;
-  }
-  RelationChange change{.is_gradual = true};
-  for (std::size_t k = 1; k < kCandidates; ++k) {
-    const std::size_t split = size * k / kCandidates;
-    if (!is_excited(coarse, 0, split, input.width(), output.width()) ||
-        !is_excited(coarse, split, size, input.width(), output.width()))
-      continue;
-    for (Eigen::Index i = 0; i < late.size(); ++i)
-      late(i) = i < static_cast<Eigen::Index>(split) ? 0.0 : 1.0;
-    const Explained explained = course.explained_by(late);
-    if (explained.share < best.share)
-      best = explained, change = {.is_gradual = false, .sample = samples[split]};
-  }
+  const Candidate best = best_candidate(course, columns, target);
   // A motion that hardly repeats has another torque on each stroke: then the rest must vanish.
-  const double rest = best.share * course.unexplained();
-  if (best.share > kChangeLeaves || (rest > kSmallTorqueRest && reversals < kManyReversals))
+  const double rest = best.explained.share * course.unexplained();
+  if (best.explained.share > kChangeLeaves ||
+      (rest > kSmallTorqueRest && reversals < kManyReversals))
     return {};
   const double slope = slope_over(columns.col(1), target);
-  const auto count = target.size();
-  const auto split =
-      static_cast<Eigen::Index>(std::ranges::lower_bound(samples, change.sample) - samples.begin());
-  const auto early_end = change.is_gradual ? count / 3 : split;
-  const auto late_begin = change.is_gradual ? count - count / 3 : split;
-  auto difference = compare_at_equal_motion(columns, target, slope, early_end, late_begin);
-  if (difference && change.is_gradual) {
-    // From the means of the first and the last third to the whole course.
-    const double passed = best_course.tail(count / 3).mean() - best_course.head(count / 3).mean();
-    difference->offset /= passed, difference->slope /= passed;
-  }
+  auto difference = compare_at_equal_motion(columns, target, slope, best);
   if (!difference) {
     // Then a friction that depends on the load explains small differences as well.
-    if ((1.0 - best.share) * course.unexplained() < kSmallTorqueRest) return {};
-    difference = best.late_minus_early;
+    if ((1.0 - best.explained.share) * course.unexplained() < kSmallTorqueRest) return {};
+    difference = best.explained.late_minus_early;
   }
-  change.offset = difference->offset;
+  RelationChange change{.is_gradual = !best.split,
+                        .sample = best.split ? samples[static_cast<std::size_t>(*best.split)] : 0,
+                        .offset = difference->offset};
   // The slope without a change is the mean of early and late, each as long as it lasts.
-  const double early = slope - best.mean * difference->slope;
-  const double late_slope = early + difference->slope;
-  change.slope_ratio = early > 0.0 && late_slope > 0.0 ? late_slope / early : 1.0;
+  const double early = slope - best.course.mean() * difference->slope;
+  const double late = early + difference->slope;
+  change.slope_ratio = early > 0.0 && late > 0.0 ? late / early : 1.0;
   const double by_slope = std::abs(change.slope_ratio - 1.0) / kSlopeChange;
   const double by_offset =
       std::abs(change.offset) / (kOffsetShare * extent_of(pair.target).width());

@@ -27,8 +27,8 @@ constexpr double kLeastAngle_rad = 1.0;
 constexpr double kLeastUnexplained = 1e-4;
 constexpr double kPositionLeaves = 0.35;
 constexpr double kPositionHeldOut = 0.6;
-constexpr double kOverRatio = 0.5;      ///< share of what q itself leaves
-constexpr double kOwnVariation = 0.05;  ///< share of its variance that the input does not explain
+constexpr double kOverRatio = 0.5;     ///< share of what q itself leaves
+constexpr double kOwnVariation = 0.1;  ///< share of its variance that the input does not explain
 constexpr std::size_t kPositionParts = 4;
 
 /// What the columns leave of a residual, in all and in parts that are not used for the fit, as shares of it.
@@ -168,14 +168,13 @@ std::optional<PositionEffect> find_position_effect(const Pair& pair,
   }
   Eigen::MatrixXd beyond(waves.rows(), waves.cols());
   for (Eigen::Index k = 0; k < waves.cols(); ++k) beyond.col(k) = curve.residual(waves.col(k));
-  if (share_of_variance(beyond.col(0), waves.col(0)) < kOwnVariation &&
-      share_of_variance(beyond.col(1), waves.col(1)) < kOwnVariation)
-    return {};  // the joint moves with its load
   const Left by_waves = left_by(beyond, rest);
   const Left by_ratio = left_by(curve.residual(q), rest);
   effect.left = by_waves.share;
   const Eigen::VectorXd course = waves * by_waves.coefficients;
   effect.amplitude = 0.5 * (course.maxCoeff() - course.minCoeff());
+  // Where the joint moves with its load, the curve explains most of what the waves do.
+  if (share_of_variance(beyond * by_waves.coefficients, course) < kOwnVariation) return {};
   if (!(by_waves.share <= kPositionLeaves && by_waves.held_out <= kPositionHeldOut &&
         by_waves.share <= kOverRatio * by_ratio.share))
     return {};

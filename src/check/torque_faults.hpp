@@ -37,7 +37,8 @@ struct PositionEffect {
       1.0;  ///< share of that which remains with sin q, cos q, and over half a turn sin 2q, cos 2q
 };
 /// Empty unless these explain 65 % of what a curve with hysteresis over the input leaves, in parts that were not used
-/// for the fit as well, and twice as much as q itself, which is what a wrong ratio of a gear adds.
+/// for the fit as well, and twice as much as q itself, which is what a wrong ratio of a gear adds. Empty also where the
+/// joint moves with its load, or in fewer than five strokes.
 [[nodiscard]] std::optional<PositionEffect> find_position_effect(
     const Pair& pair, const std::vector<double>& angle_rad);
 

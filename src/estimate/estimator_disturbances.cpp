@@ -16,6 +16,8 @@ constexpr double kExcursionDoubt = 2.0;
 constexpr double kLargestShare = 2.0;
 /// Ticks of an excursion per tick of its return.
 constexpr double kTicksPerReturn = 2.0;
+/// Ticks inside the range per tick of the way back from a width beyond it.
+constexpr double kReturnInside = 1.5;
 
 }  // namespace
 
@@ -114,7 +116,11 @@ void EstimatorCore::limit(Conditioned& input) noexcept {
 // can be the sensor that is wrong, by up to the whole range and what is beyond it.
 void EstimatorCore::count_excursion(double first) noexcept {
   const double beyond = std::max(ranges_.front().lowest - first, first - ranges_.front().highest);
-  if (!(beyond > first_width_)) return;
+  if (!(beyond > first_width_)) {
+    // As fast as it comes back to the border, it may go on inside.
+    if (excursion_share_ > 0.0) excursion_ticks_ += kTicksPerReturn * kReturnInside;
+    return;
+  }
   if (first_width_ > 0.0)
     excursion_share_ =
         std::max(excursion_share_, std::min(1.0 + beyond / first_width_, kLargestShare));
