@@ -231,7 +231,8 @@ std::string unit_doubt(const Recording& recording, const EstimatorSettings& trai
   const Pair pair{first_feature(recording, trained.features),
                   bridged(recording.channel(trained.target))};
   if (std::abs(correlation(pair.input, pair.target)) < kClearCorrelation) return {};
-  return std::string(unit_mistake(std::abs(line_through(pair).slope / trained.fallback.slope[0])));
+  return std::string(
+      unit_mistake(std::abs(line_through(pair).slope / trained.fallback.slope[0]), false));
 }
 
 std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec) {

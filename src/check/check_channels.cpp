@@ -293,7 +293,8 @@ void Checker::check_gaps(bool with_warnings) {
 }
 
 void Checker::check_gaps_of(std::size_t r, bool with_warnings) {
-  check_jump_of_input(r);  // later checks leave a recording with a jump out
+  if (coded_[r] != 0) return;  // numbers that begin again jump
+  check_jump_of_input(r);      // later checks leave a recording with a jump out
   if (!with_warnings) return;
   if (!check_cut(r)) check_cadence(r);
   const Recording& recording = dataset_.records[r].recording;

@@ -23,6 +23,32 @@ bool is_motion_or_load(std::string_view channel) {
   return parts && std::ranges::find(kUnits, parts->unit->si_suffix) != kUnits.end();
 }
 
+bool is_angle(std::string_view channel) {
+  const auto parts = split_channel_name(channel);
+  return parts && parts->unit->si_suffix == "rad";
+}
+
+/// Whether the name is that of the output side of a gear.
+bool is_on_output_side(std::string_view channel) {
+  return std::ranges::any_of(
+      std::to_array<std::string_view>({"joint", "link", "load", "output"}),
+      [&](std::string_view word) { return channel.find(word) != std::string_view::npos; });
+}
+
+/// What to do where one of two angles moves `ratio` times as far as the other one, by a gear.
+std::string gear_advice(const std::string& further, const std::string& other, double ratio) {
+  if (is_on_output_side(further) && !is_on_output_side(other))
+    return fmt::format(
+        "That is the ratio of a gear, by which {0} was divided once too often: remove gear_ratio: "
+        "from its rule in the mapping, or if the drive divides by it twice, multiply:  channels: "
+        "{{{0}: {{from: ..., scale: {1:.3g}}}}}",
+        other, ratio);
+  return fmt::format(
+      "That is as far as before a gear of about {1:.3g}: write its ratio in a mapping, with the "
+      "column of {0}:  channels: {{{0}: {{from: ..., gear_ratio: {1:.3g}}}}}",
+      further, ratio);
+}
+
 }  // namespace
 
 FeatureSpec Checker::spec_of(std::size_t input) const {
@@ -90,13 +116,14 @@ void Checker::compare_slopes() {
 
 void Checker::report_slope(std::size_t r, double slope, std::size_t usual, double usual_slope,
                            bool is_majority) {
-  const std::string_view mistake = unit_mistake(slope / usual_slope);
   const Recording& other = dataset_.records[usual].recording;
-  if (mistake.empty() && !other.conditions().empty()) return;  // the condition explains it
   const double torque_ratio =
       extent_of(pairs_[r].target).width() / extent_of(pairs_[usual].target).width();
   const bool by_torque =
       std::abs(std::log(torque_ratio)) > 0.5 * std::log(ratio_of(slope, usual_slope));
+  const std::string_view mistake =
+      unit_mistake(slope / usual_slope, !by_torque && is_angle(spec_.inputs.front()));
+  if (mistake.empty() && !other.conditions().empty()) return;  // the condition explains it
   spoiled_[r] = 1;
   const std::string& own = dataset_.records[r].recording.name();
   add(mistake.empty() ? Verdict::warn : Verdict::fail, "units",
@@ -106,7 +133,7 @@ void Checker::report_slope(std::size_t r, double slope, std::size_t usual, doubl
                   slope > usual_slope ? "larger" : "smaller", own,
                   is_majority ? "the other recordings, as in " : "", other.name()),
       mistake.empty()
-          ? "Check spring and units: recordings of one joint have one stiffness."
+          ? "Check spring, units and gear ratio: recordings of one joint have one stiffness."
           : fmt::format(
                 "That is the factor between {}: check the unit of {} in {}, and specify it in "
                 "the column's name or with unit: in a mapping.",
@@ -140,15 +167,20 @@ void Checker::check_units_within(std::size_t r) {
   const Pair sides{recording.channel(sources_[0]).values, recording.channel(sources_[1]).values};
   if (correlation(sides.input, sides.target) < kOneMotion) return;
   const double slope = line_through(sides).slope;
-  const std::string_view mistake = unit_mistake(slope);
-  if (mistake.empty()) return;
+  const bool are_angles = is_angle(sources_[0]) && is_angle(sources_[1]);
+  const double ratio = std::max(slope, 1.0 / slope);
+  const std::string_view mistake = unit_mistake(slope, are_angles);
+  if (mistake.empty() && !(are_angles && ratio >= kLowestGearRatio)) return;
   spoiled_[r] = 1;
+  const std::string& further = slope > 1.0 ? sources_[1] : sources_[0];
+  const std::string& other = slope > 1.0 ? sources_[0] : sources_[1];
   add(Verdict::fail, "units", recording.name(),
-      fmt::format("{} moves {:.4g} times as far as {}", slope > 1.0 ? sources_[1] : sources_[0],
-                  std::max(slope, 1.0 / slope), slope > 1.0 ? sources_[0] : sources_[1]),
-      fmt::format("That is the factor between {}: specify the column's unit in its name or with "
-                  "unit: in a mapping.",
-                  mistake));
+      fmt::format("{} moves {:.4g} times as far as {}", further, ratio, other),
+      mistake.empty()
+          ? gear_advice(further, other, sides_[r] ? ratio_of(1.0 + sides_[r]->excess, 1.0) : ratio)
+          : fmt::format("That is the factor between {}: specify the column's unit in its name or "
+                        "with unit: in a mapping.",
+                        mistake));
 }
 
 void Checker::check_sign_flips() {

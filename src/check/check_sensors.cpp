@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "check/checker.hpp"
 #include "check/hysteresis_fit.hpp"
@@ -43,26 +46,46 @@ std::string coding_text(const CodedNumbers& coded) {
   return {};
 }
 
+/// The rule of the mapping that makes a channel.
+std::optional<ChannelRule> rule_of(const Recording& recording, const std::string& name) {
+  if (recording.mapping.empty()) return std::nullopt;
+  for (const ChannelRule& rule : parse_mapping(recording.mapping, recording.name()).channels)
+    if (const auto parts = split_channel_name(rule.name); parts && parts->si() == name) return rule;
+  return std::nullopt;
+}
+
+/// What one turn of an encoder is in a channel, also before a gear; empty for other quantities.
+std::vector<double> turns_of(const Recording& recording, const std::string& name) {
+  const auto parts = split_channel_name(name);
+  if (!parts || parts->unit->si_suffix != "rad") return {};
+  constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+  std::vector<double> turns{kTurn_rad};
+  if (const auto rule = rule_of(recording, name)) {
+    if (rule->gear_ratio != 1.0) turns.push_back(kTurn_rad / rule->gear_ratio);
+    if (rule->scale != 1.0) turns.push_back(kTurn_rad * std::abs(rule->scale) / rule->gear_ratio);
+  }
+  return turns;
+}
+
 /// The mapping line that decodes a channel.
 std::string coding_advice(const Recording& recording, const std::string& name,
                           const CodedNumbers& coded) {
-  if (!recording.mapping.empty()) {
-    const Mapping mapping = parse_mapping(recording.mapping, recording.name());
-    for (const ChannelRule& rule : mapping.channels) {
-      const auto factor = column_factor(rule, LogColumn{.name = rule.from, .values = {}});
-      const auto parts = split_channel_name(rule.name);
-      if (factor && parts && parts->si() == name)
-        return fmt::format("Mapping: add {}: {:.9g} to the rule of {}, after its from: {}.",
-                           key_of(coded.kind), coded.span / std::abs(*factor), rule.name,
-                           rule.from);
-    }
-  }
+  const std::string zero =
+      coded.kind == CodedNumbers::Kind::wrapped
+          ? " The zero is then that of the turn in which a recording begins: give each its zero "
+            "(zero: in the mapping)."
+          : "";
+  if (const auto rule = rule_of(recording, name))
+    if (const auto factor = column_factor(*rule, LogColumn{.name = rule->from, .values = {}}))
+      return fmt::format("Mapping: add {}: {:.9g} to the rule of {}, after its from: {}.{}",
+                         key_of(coded.kind), coded.span / std::abs(*factor), rule->name, rule->from,
+                         zero);
   return fmt::format(
       "Mapping: channels: {{{}: {{from: ..., {}: {:.9g}}}}}, with the column of {} (the number is "
       "in {}; give it in "
       "the "
-      "unit of the column)",
-      name, key_of(coded.kind), coded.span, name, unit_label(name));
+      "unit of the column).{}",
+      name, key_of(coded.kind), coded.span, name, unit_label(name), zero);
 }
 
 }  // namespace
@@ -75,15 +98,19 @@ void Checker::check_coding() {
       std::vector<double> values;
       for (const std::size_t i : new_samples(channel))
         samples.push_back(i), values.push_back(channel.values[i]);
-      const auto coded = find_coded_numbers(values, finest_step(channel));
+      const auto coded =
+          find_coded_numbers(values, finest_step(channel), turns_of(recording, channel.name));
       if (!coded) return;
       spoiled_[r] = 1;
       coded_[r] = 1;
       const std::size_t first = samples[coded->first];
       add(Verdict::fail, "coding", recording.name(),
-          fmt::format("{} jumps {} times by {:.6g} {}{}; the first time at t = {:.4g} s",
-                      channel.name, coded->jumps, coded->span, unit_label(channel.name),
-                      coding_text(*coded), recording.time_s(first)),
+          coded->jumps == 1
+              ? fmt::format("{} jumps by {:.6g} {}{}; at t = {:.4g} s", channel.name, coded->span,
+                            unit_label(channel.name), coding_text(*coded), recording.time_s(first))
+              : fmt::format("{} jumps {} times by {:.6g} {}{}; the first time at t = {:.4g} s",
+                            channel.name, coded->jumps, coded->span, unit_label(channel.name),
+                            coding_text(*coded), recording.time_s(first)),
           coding_advice(recording, channel.name, *coded), {{first, first + 1}});
     });
   });

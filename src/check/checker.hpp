@@ -186,6 +186,7 @@ class Checker {
   static constexpr double kOneMotion = 0.99;  ///< correlation
   static constexpr double kNarrow = 0.5;
   static constexpr double kSlopeRatio = 5.0;
+  static constexpr double kLowestGearRatio = 3.0;
   static constexpr double kSpeedHalfWindow_s = 0.05;
   static constexpr double kSpeedRatio = 2.0;
   static constexpr double kScaleOfAGear = 0.03;

@@ -246,21 +246,24 @@ std::optional<double> unexplained_share(const Pair& pair,
   return FixedColumns(columns).unexplained(at_samples(pair.target, samples));
 }
 
-std::string_view unit_mistake(double ratio) {
+std::string_view unit_mistake(double ratio, bool is_angle) {
   struct Mistake {
     double ratio;
     std::string_view name;
+    bool is_of_angles = true;
   };
   constexpr double kNear = 1.1;
   constexpr auto kMistakes = std::to_array<Mistake>({{57.29577951308232, "degrees and radians"},
-                                                     {100.0, "Nm and Ncm"},
+                                                     {100.0, "Nm and Ncm", false},
                                                      {1000.0, "a unit and its thousandth"},
                                                      {57295.77951308232, "degrees and mrad"},
                                                      {1e6, "a unit and its millionth"}});
   if (!(ratio > 0.0)) return {};
   const double factor = std::max(ratio, 1.0 / ratio);
   for (const Mistake& mistake : kMistakes)
-    if (factor < kNear * mistake.ratio && mistake.ratio < kNear * factor) return mistake.name;
+    if ((mistake.is_of_angles || !is_angle) && factor < kNear * mistake.ratio &&
+        mistake.ratio < kNear * factor)
+      return mistake.name;
   return {};
 }
 

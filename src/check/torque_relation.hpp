@@ -54,7 +54,7 @@ inline constexpr std::size_t kFewestLevels = 5;
                                                       std::span<const std::vector<double>> others);
 
 /// The unit mistake that makes a number `ratio` (or 1 / `ratio`) times too large, within 10 %;
-/// empty if none does.
-[[nodiscard]] std::string_view unit_mistake(double ratio);
+/// empty if none does. A torque may be in Ncm, an angle has no unit of 100.
+[[nodiscard]] std::string_view unit_mistake(double ratio, bool is_angle);
 
 }  // namespace torsio

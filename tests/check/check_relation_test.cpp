@@ -129,6 +129,27 @@ TEST(CheckUnits, FailOnAWrongGearRatio) {
       << first_of(findings, "units").message;
 }
 
+TEST(CheckUnits, NameTheRatioOfAGearWhereOneAngleMovesFurther) {
+  const auto with_factor = [](const std::string& channel, double factor) {
+    return findings_of(alone(with_channel(bench_recording("gear"), channel, [&](Channel& angle) {
+      for (double& value : angle.values) value *= factor;
+    })));
+  };
+  for (const double ratio : {30.0, 100.0, 161.0}) {
+    const auto missing = with_factor("gear_angle_rad", ratio);
+    ASSERT_EQ(verdict_of(missing, "units"), Verdict::fail) << text_of(missing);
+    const std::string& advice = first_of(missing, "units").advice;
+    const std::size_t at = advice.find("gear_ratio: ");
+    ASSERT_NE(at, std::string::npos) << advice;
+    EXPECT_NEAR(std::stod(advice.substr(at + 12)), ratio, 0.02 * ratio) << advice;
+    EXPECT_EQ(advice.find("Ncm"), std::string::npos) << advice;
+    const auto twice = with_factor("gear_angle_rad", 1.0 / ratio);
+    ASSERT_EQ(verdict_of(twice, "units"), Verdict::fail) << text_of(twice);
+    EXPECT_NE(first_of(twice, "units").advice.find("once too often"), std::string::npos)
+        << first_of(twice, "units").advice;
+  }
+}
+
 TEST(CheckUnits, WarnOfADeflectionOfMoreThanOneAndAHalfRadians) {
   Recording degrees = sweep();
   for (const std::string name : {"gear_angle_rad", "joint_angle_rad"})

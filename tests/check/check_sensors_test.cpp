@@ -68,6 +68,39 @@ TEST(CheckSensors, NameAnAngleThatBeginsAgainAfterATurn) {
       << first_of(findings, "coding").advice;
 }
 
+/// The angle of one turn, in a channel in which that is `turn`.
+double within_turn(double value, double turn) { return value - turn * std::floor(value / turn); }
+
+TEST(CheckSensors, NameTheTurnOfAMotorBeforeItsGear) {
+  constexpr double kTurn = 2.0 * M_PI / 100.0;
+  Recording motor = changed(bench_recording("motor"), [](Channel& channel) {
+    if (channel.name != "gear_angle_rad") return;
+    for (double& value : channel.values) value = within_turn(value, kTurn);
+  });
+  motor.mapping = "channels: {gear_angle_rad: {from: motor_deg, unit: deg, gear_ratio: 100}}";
+  const auto findings = findings_of(alone(motor));
+  ASSERT_EQ(verdict_of(findings, "coding"), Verdict::fail) << text_of(findings);
+  const std::string& advice = first_of(findings, "coding").advice;
+  EXPECT_NE(advice.find("unwrap: 360 to the rule of gear_angle_rad"), std::string::npos) << advice;
+  EXPECT_NE(advice.find("zero:"), std::string::npos) << advice;
+  EXPECT_EQ(text_of(findings).find("gaps"), std::string::npos) << text_of(findings);
+}
+
+TEST(CheckSensors, NameOneCrossingOfAWholeTurnButNoSlip) {
+  const auto crossing = [](double jump) {
+    return findings_of(alone(changed(bench_recording("once"), [jump](Channel& channel) {
+      if (channel.name != "joint_angle_rad") return;
+      for (std::size_t n = 2000; n < channel.values.size(); ++n) channel.values[n] += jump;
+    })));
+  };
+  const auto turned = crossing(2.0 * M_PI);
+  EXPECT_EQ(verdict_of(turned, "coding"), Verdict::fail) << text_of(turned);
+  EXPECT_EQ(text_of(turned).find("gaps"), std::string::npos) << text_of(turned);
+  const auto slipped = crossing(1.0);
+  EXPECT_EQ(verdict_of(slipped, "coding"), Verdict::pass) << text_of(slipped);
+  EXPECT_EQ(verdict_of(slipped, "gaps"), Verdict::warn) << text_of(slipped);
+}
+
 TEST(CheckSensors, RecogniseASensorThatIsHeldInAFasterLog) {
   const auto held = [](bool is_marked) {
     return alone(changed(bench_recording("held"), [is_marked](Channel& channel) {

@@ -82,6 +82,33 @@ double nearest_power(double jump, double step) {
   return bits >= kFewestBits && bits <= kMaxBits ? std::exp2(bits) * step : 0.0;
 }
 
+/// An angle that begins again after a turn, also once only. Either it stays within the turn, or each jump is a whole turn
+/// apart from a motion that is small compared with it.
+std::optional<CodedNumbers> find_turns(std::span<const double> values, double step, double turn) {
+  constexpr double kSmall = 0.02;  // share of a turn
+  CodedNumbers found{.span = turn, .codes = step > 0.0 ? std::round(turn / step) : 0.0};
+  double usual = 0.0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double jump = std::abs(values[i] - values[i - 1]);
+    if (jump <= 0.5 * turn) {
+      usual = std::max(usual, jump);
+    } else if (++found.jumps == 1) {
+      found.first = i;
+    }
+  }
+  if (found.jumps == 0 || found.jumps > values.size() / 2 || !(usual > 0.0)) return std::nullopt;
+  const double largest_step = kOverOthers * (usual + step);
+  const auto [lowest, highest] = std::ranges::minmax(values);
+  const bool is_within_turn = std::abs(highest - lowest - turn) <= largest_step;
+  if (!is_within_turn && largest_step > kSmall * turn) return std::nullopt;
+  std::vector<double> decoded(values.begin(), values.end());
+  unwrap(decoded, turn);
+  if (step_sums_of(decoded).largest > largest_step ||
+      kinks_of(decoded, 1) >= kRoughness * kinks_of(values, 1))
+    return std::nullopt;
+  return found;
+}
+
 }  // namespace
 
 void decode_sign_bit(std::vector<double>& values, double sign_bit) noexcept {
@@ -107,11 +134,14 @@ void unwrap(std::vector<double>& values, double span) noexcept {
   }
 }
 
-std::optional<CodedNumbers> find_coded_numbers(std::span<const double> values, double step) {
+std::optional<CodedNumbers> find_coded_numbers(std::span<const double> values, double step,
+                                               std::span<const double> turns) {
   if (values.size() < 2) return std::nullopt;
   if (step > 0.0) step = refined_step(values, step);
   const auto [lowest, highest] = std::ranges::minmax(values);
   const double range = highest - lowest;
+  for (const double turn : turns)
+    if (const auto found = find_turns(values, step, turn)) return found;
   std::vector<double> jumps;
   double usual = 0.0;  // the largest one besides the jumps
   CodedNumbers found;
@@ -125,6 +155,12 @@ std::optional<CodedNumbers> find_coded_numbers(std::span<const double> values, d
     jumps.push_back(jump);
   }
   found.jumps = jumps.size();
+  // A single jump is a wrap if it passes through a whole range of codes.
+  if (const double codes = nearest_power(range + step, step);
+      jumps.size() == 1 && codes > 0.0 &&
+      std::abs(range + step - codes) <= kOverOthers * (usual + step) &&
+      std::abs(jumps.front() - codes) <= kOverOthers * (usual + step))
+    if (const auto turned = find_turns(values, step, codes)) return turned;
   if (jumps.size() < kFewestJumps || jumps.size() > values.size() / 2) return std::nullopt;
   const double jump = median_jump(jumps);
   const auto is_other = [&](double of) { return std::abs(of / jump - 1.0) > kSameJump; };

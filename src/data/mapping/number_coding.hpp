@@ -32,7 +32,10 @@ struct CodedNumbers {
 /// three ways to decode numbers makes continuous. Negative numbers are decoded by their magnitude.
 /// @param values finite ones, in the order of time
 /// @param step resolution of the sensor; 0: not known
+/// @param turns spans of whole turns: a jump by one of them is a wrap even if it is the only one, or if an angle before a
+/// gear passes through the turn within a few samples
 [[nodiscard]] std::optional<CodedNumbers> find_coded_numbers(std::span<const double> values,
-                                                             double step);
+                                                             double step,
+                                                             std::span<const double> turns = {});
 
 }  // namespace torsio
