@@ -13,6 +13,8 @@
 #include "data/inspect_clock.hpp"
 #include "data/log_table.hpp"
 #include "data/mapping/column_advice.hpp"
+#include "data/mapping/number_coding.hpp"
+#include "data/mapping/row_order.hpp"
 #include "data/names.hpp"
 #include "numerics/quantile.hpp"
 #include "torsio/core/error.hpp"
@@ -39,13 +41,34 @@ struct Stamps {
   }
 };
 
+/// Whether stamps are repeated, and each time with every value, as where a message comes twice.
+bool repeats_are_rows(const Stamps& stamps) {
+  if (stamps.report.duplicated == 0) return false;
+  for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
+    const std::size_t row = stamps.rows.begin + i;
+    if (stamps.values_s[i] == stamps.values_s[i - 1] &&
+        !are_equal_rows(stamps.columns, row - 1, row))
+      return false;
+  }
+  return true;
+}
+
 /// An estimate of the log's rate, without its gaps; repeated stamps contribute only their number. 0: none
 double rate_of_steps(const Stamps& stamps) {
   constexpr double kSimple = 1e-3;
   constexpr double kSimpleOfCoarse = 1e-2;
   const double step_s = stamps.report.stamp_step_s;
   if (!(step_s > 0.0)) return 0.0;
-  if (stamps.report.duplicated == 0) return simplest_rate(1.0 / step_s, kSimple);
+  if (stamps.report.backward > 0) {  // rows in another order
+    std::vector<double> sorted_s(stamps.values_s.begin(), stamps.values_s.end());
+    std::ranges::sort(sorted_s);
+    sorted_s.erase(std::unique(sorted_s.begin(), sorted_s.end()), sorted_s.end());
+    return simplest_rate(
+        static_cast<double>(sorted_s.size() - 1) / (sorted_s.back() - sorted_s.front()),
+        kSimpleOfCoarse);
+  }
+  if (stamps.report.duplicated == 0 || repeats_are_rows(stamps))
+    return simplest_rate(1.0 / step_s, kSimple);
   double duration_s = 0.0;
   double steps = 0.0;
   for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
@@ -63,16 +86,27 @@ std::string rate_line(const Stamps& stamps) {
                        : std::string("rate: with the sample rate of the log");
 }
 
-/// `clock:` of the mapping, with what it has already.
-std::string clock_line(const Stamps& stamps, std::string_view entry, double split_at_s = 0.0) {
-  if (split_at_s == 0.0) split_at_s = stamps.mapping.clock.split_at_gaps_s;
-  return fmt::format("clock: {{{}{}{}}}", entry, !entry.empty() && split_at_s > 0.0 ? ", " : "",
-                     split_at_s > 0.0 ? fmt::format("split_at_gaps: {:.4g}s", split_at_s) : "");
-}
-
 std::string resample_entry(const Stamps& stamps) {
   const double wanted_Hz = stamps.mapping.clock.resample_Hz;
   return fmt::format("resample: {:.6g}Hz", wanted_Hz > 0.0 ? wanted_Hz : rate_of_steps(stamps));
+}
+
+/// `clock:` of the mapping, with what it has already.
+std::string clock_line(const Stamps& stamps, std::string_view entry, double split_at_s = 0.0) {
+  if (split_at_s == 0.0) split_at_s = stamps.mapping.clock.split_at_gaps_s;
+  std::string line(entry);
+  if (stamps.mapping.clock.sort) line += line.empty() ? "sort: true" : ", sort: true";
+  if (split_at_s > 0.0)
+    line += fmt::format("{}split_at_gaps: {:.4g}s", line.empty() ? "" : ", ", split_at_s);
+  return "clock: {" + line + "}";
+}
+
+/// `clock:` of the mapping, with the rows sorted.
+std::string sort_line(const Stamps& stamps) {
+  std::string entry = "sort: true";
+  if (stamps.mapping.clock.rebuild) entry += ", rebuild: true";
+  if (stamps.mapping.clock.resample_Hz > 0.0) entry += ", " + resample_entry(stamps);
+  return clock_line(stamps, entry);
 }
 
 std::string remedies(const Stamps& stamps) {
@@ -198,6 +232,41 @@ std::optional<Overflow> find_overflow(double back_s, double step_s) {
   return std::nullopt;
 }
 
+/// Whether a counter of that span makes the stamps: they are within it, and unwrapped they never run backward.
+bool is_counter_of(const Stamps& stamps, double span_s) {
+  const auto [lowest, highest] = std::ranges::minmax(stamps.values_s);
+  if (highest - lowest > span_s) return false;
+  std::vector<double> values_s(stamps.values_s.begin(), stamps.values_s.end());
+  unwrap(values_s, span_s);
+  return std::ranges::is_sorted(values_s);
+}
+
+/// Whether the stamps jump to later ones than before soon after they went back: single rows came late.
+bool is_late_row(const Stamps& stamps, std::size_t back) {
+  const double longest_s = kLongestGapIntervals * stamps.report.stamp_step_s;
+  const std::size_t end = std::min(stamps.values_s.size(), back + 1 + kMaxLateRows);
+  for (std::size_t i = back + 1; i < end; ++i) {
+    if (stamps.values_s[i] <= stamps.values_s[back - 1]) continue;
+    return stamps.values_s[i] - stamps.values_s[i - 1] > longest_s;
+  }
+  return back + 1 == stamps.values_s.size();
+}
+
+[[noreturn]] void refuse_backward(const Stamps& stamps, std::size_t at) {
+  throw ClockError(
+      {.place = stamps.place(at),
+       .problem =
+           fmt::format("the rows are not in the order of their time stamps ({} run backward)",
+                       stamps.report.backward),
+       .expected = fmt::format("at least {} s", stamps.values_s[at - 1]),
+       .found = fmt::format("{} s", stamps.values_s[at]),
+       .advice = fmt::format("If the stamps are correct and rows came late, write in a mapping  "
+                             "{}\n  If the rows are "
+                             "in order, taken evenly, and the stamps wrong, leave the stamps out:  "
+                             "drop: [{}] and  {}",
+                             sort_line(stamps), yaml_name(stamps.column.name), rate_line(stamps))});
+}
+
 /// The mapping line that unwraps the clock.
 std::string unwrap_advice(const Stamps& stamps, double span_s) {
   const auto line = [&](double factor) { return fmt::format("unwrap: {:.10g}", span_s / factor); };
@@ -218,7 +287,9 @@ void refuse_new_beginning(const Stamps& stamps) {
   for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
     const double back_s = stamps.values_s[i - 1] - stamps.values_s[i];
     if (!(back_s > kLongestGapIntervals * step_s)) continue;
-    const auto overflow = find_overflow(back_s, step_s);
+    auto overflow = find_overflow(back_s, step_s);
+    if (overflow && !is_counter_of(stamps, overflow->span_s)) overflow.reset();
+    if (!overflow && is_late_row(stamps, i)) refuse_backward(stamps, i);
     throw ClockError(
         {.place = stamps.place(i),
          .problem = overflow
@@ -259,20 +330,25 @@ void refuse_unusable(const Stamps& stamps) {
 }
 
 void refuse_not_increasing(const Stamps& stamps, const std::string& advice) {
-  const std::size_t at = stamps.report.first_not_increasing;
+  std::size_t at = stamps.report.first_not_increasing;
   if (at == 0) return;
-  throw ClockError(
-      {.place = stamps.place(at),
-       .problem = fmt::format("the clock does not advance ({} stamps are repeated, {} run "
-                              "backward)",
-                              stamps.report.duplicated, stamps.report.backward),
-       .expected = fmt::format("more than {} s", stamps.values_s[at - 1]),
-       .found = fmt::format("{} s", stamps.values_s[at]),
-       .advice = advice});
+  if (stamps.report.backward > 0) {
+    while (stamps.values_s[at] >= stamps.values_s[at - 1]) ++at;
+    refuse_backward(stamps, at);
+  }
+  throw ClockError({.place = stamps.place(at),
+                    .problem = fmt::format("the clock does not advance ({} stamps are repeated)",
+                                           stamps.report.duplicated),
+                    .expected = fmt::format("more than {} s", stamps.values_s[at - 1]),
+                    .found = fmt::format("{} s", stamps.values_s[at]),
+                    .advice = advice});
 }
 
 double even_rate(const Stamps& stamps) {
-  refuse_not_increasing(stamps, remedies(stamps));
+  refuse_not_increasing(
+      stamps, repeats_are_rows(stamps)
+                  ? "Rows that occur twice are left out by a mapping with  " + sort_line(stamps)
+                  : remedies(stamps));
   const ClockReport& report = stamps.report;
   const std::size_t odd = report.worst_interval;
   if (!report.is_uniform()) refuse_lost(stamps);
@@ -319,12 +395,7 @@ void refuse_gaps(const Stamps& stamps) {
   std::size_t longest = 0;
   for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
     const double interval = stamps.values_s[i] - stamps.values_s[i - 1];
-    if (interval < 0.0)
-      throw ClockError({.place = stamps.place(i),
-                        .problem = "the clock runs backward",
-                        .expected = fmt::format("at least {} s", stamps.values_s[i - 1]),
-                        .found = fmt::format("{} s", stamps.values_s[i]),
-                        .advice = remedies(stamps)});
+    if (interval < 0.0) refuse_backward(stamps, i);
     if (interval > longest_s) longest_s = interval, longest = i;
   }
   if (!is_too_long(stamps, longest_s)) return;

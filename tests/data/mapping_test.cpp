@@ -1,5 +1,6 @@
 #include "torsio/data/mapping.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -7,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -160,7 +162,7 @@ computed_from: {torque_Nm: [iq_A]}
 TEST(Mapping, KeepsTheRulesOfGapsAndCodings) {
   const std::string text =
       "channels:\n  torque_Nm: {from: raw, modulus: 65536}\n"
-      "clock: {resample: 100, max_gap: 0.5, split_at_gaps: 2}\n";
+      "decimal: comma\nclock: {resample: 100, max_gap: 0.5, split_at_gaps: 2, sort: true}\n";
   EXPECT_EQ(mapping_text(parse_mapping(text, "m")), text);
 }
 
@@ -211,6 +213,110 @@ TEST(Mapping, UnwrapsTheCounterOfAClock) {
   const Recording recording = read(csv, "channels: {t_s: {from: t_us, unwrap: 4294967296}}")[0];
   EXPECT_NEAR(recording.sample_rate_Hz(), 100.0, 1.0);
   EXPECT_EQ(recording.size(), 4U);
+}
+
+/// Rows of 100 Hz with the number of the row as value, in this order.
+std::string log_of_rows(const std::vector<int>& rows, const std::vector<double>& shift_s = {}) {
+  std::string csv = "t_s,x_m\n";
+  for (const int row : rows)
+    csv += fmt::format(
+        "{:.4f},{}\n",
+        0.01 * row + (shift_s.empty() ? 0.0 : shift_s[static_cast<std::size_t>(row)]), row);
+  return csv;
+}
+
+std::vector<int> rows_in_order(int count) {
+  std::vector<int> rows(static_cast<std::size_t>(count));
+  std::iota(rows.begin(), rows.end(), 0);
+  return rows;
+}
+
+void move_row(std::vector<int>& rows, std::size_t from, std::size_t later) {
+  const int row = rows[from];
+  rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(from));
+  rows.insert(rows.begin() + static_cast<std::ptrdiff_t>(from + later), row);
+}
+
+TEST(Mapping, RowsThatComeLateAreSortedAndThoseThatComeTwiceReadOnce) {
+  std::vector<int> rows = rows_in_order(300);
+  move_row(rows, 20, 6);
+  move_row(rows, 100, 1);
+  move_row(rows, 250, 49);
+  rows.insert(rows.begin() + 60, 58);
+  for (const char* mapping :
+       {"{}", "clock: {rebuild: true}", "clock: {resample: 100Hz}", "clock: {split_at_gaps: 1s}"}) {
+    const std::vector<Recording> recordings = read(log_of_rows(rows), mapping);
+    ASSERT_EQ(recordings.size(), 1U) << mapping;
+    ASSERT_EQ(recordings[0].size(), 300U) << mapping;
+    EXPECT_NEAR(recordings[0].sample_rate_Hz(), 100.0, 1e-9);
+    for (std::size_t i = 0; i < 300; ++i)
+      EXPECT_NEAR(recordings[0].channels()[0].values[i], static_cast<double>(i), 1e-9);
+    ASSERT_EQ(recordings[0].notes.size(), 2U);
+    EXPECT_NE(recordings[0].notes[0].find("4 rows come late, by up to 49 rows"), std::string::npos)
+        << recordings[0].notes[0];
+    EXPECT_NE(recordings[0].notes[1].find("1 row that repeats another"), std::string::npos);
+  }
+}
+
+TEST(Mapping, LateRowsOfEachRecordAreSorted) {
+  const Recording recording =
+      read("run,t_s,x_m\n1,0,0\n1,1,1\n1,2,2\n1,4,4\n1,3,3\n2,0,0\n2,1,1\n2,2,2\n",
+           "{split_by: run, keep: [1]}")[0];
+  EXPECT_EQ(recording.channel("x_m").values, (std::vector{0.0, 1.0, 2.0, 3.0, 4.0}));
+}
+
+TEST(Mapping, TheLineOfALateRowIsThatOfTheFile) {
+  std::vector<int> rows = rows_in_order(50);
+  move_row(rows, 20, 5);
+  rows.erase(rows.begin() + 40);
+  const std::string message = test::error_message([&] { (void)read(log_of_rows(rows)); });
+  EXPECT_NE(message.find("line 42, column 1 (t_s): 1 sample is missing"), std::string::npos)
+      << message;
+}
+
+TEST(Mapping, EveryAdviceOnRowsInAnotherOrderLeadsToARecording) {
+  std::vector<int> late = rows_in_order(300);
+  for (std::size_t row = 10; row < 280; row += 9) move_row(late, row, 6);
+  std::vector<int> twice = rows_in_order(300);
+  for (std::size_t row = 280; row > 10; row -= 9)
+    twice.insert(twice.begin() + static_cast<std::ptrdiff_t>(row), twice[row]);
+  std::vector<double> jitter_s;
+  for (int i = 0; i < 300; ++i) jitter_s.push_back(0.004 * std::sin(1.7 * i));
+  for (const std::vector<int>& rows : {late, twice}) {
+    const std::string csv = log_of_rows(rows, jitter_s);
+    std::vector<std::string> mappings{"{}"};
+    std::size_t read_logs = 0;
+    for (std::size_t k = 0; k < mappings.size(); ++k) {
+      ASSERT_LT(k, 12U) << "circle of advice: " << mappings[k];
+      const std::string message = test::error_message([&] { (void)read(csv, mappings[k]); });
+      EXPECT_EQ(message.find("begins again"), std::string::npos) << message;
+      EXPECT_EQ(message.find("starts again"), std::string::npos) << message;
+      if (message.empty()) ++read_logs;
+      for (std::size_t at = message.find("clock: {"); at != std::string::npos;
+           at = message.find("clock: {", at + 1))
+        mappings.push_back(message.substr(at, message.find('}', at) + 1 - at));
+      if (message.find("drop: [t_s]") != std::string::npos)
+        mappings.push_back("{drop: [t_s], rate: 100Hz}");
+      if (message.find("rate: ") != std::string::npos) {
+        EXPECT_NE(message.find("rate: 100Hz"), std::string::npos) << message;
+      }
+    }
+    EXPECT_GT(read_logs, 1U);
+  }
+}
+
+TEST(Mapping, ACounterThatOverflowsAndASecondLogAreNamedWhereTheyAre) {
+  std::string counter = "t_us,x_m\n";
+  for (int i = 0; i < 300; ++i) counter += fmt::format("{},{}\n", (i * 1000) % 65536, i);
+  const std::string overflow = test::error_message([&] { (void)read(counter); });
+  EXPECT_NE(overflow.find("begins again after 2^16"), std::string::npos) << overflow;
+  EXPECT_EQ(read(counter, "channels: {t_s: {from: t_us, unwrap: 65536}}")[0].size(), 300U);
+  const std::string log = log_of_rows(rows_in_order(200));
+  const std::string restart =
+      test::error_message([&] { (void)read(log + log.substr(log.find('\n') + 1)); });
+  EXPECT_NE(restart.find("line 202"), std::string::npos) << restart;
+  EXPECT_NE(restart.find("the clock starts again"), std::string::npos) << restart;
+  EXPECT_EQ(read(log + log.substr(log.find('\n') + 1), "clock: {split_at_gaps: 0.05s}").size(), 2U);
 }
 
 TEST(Mapping, ALogWithoutAClockTakesTheGivenRate) {

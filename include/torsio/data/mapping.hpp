@@ -43,6 +43,8 @@ struct ClockRule {
   /// Each part between two longer intervals, and from a stamp that is earlier than the one before, becomes a
   /// recording. 0: no.
   double split_at_gaps_s = 0.0;
+  bool sort =
+      false;  ///< rows are brought into the order of their stamps, however far they are from it
   std::string format = {};  ///< how a CSV file writes dates, for strptime; empty: ISO 8601
 };
 
@@ -59,9 +61,11 @@ struct Mapping {
   std::vector<ChannelDefinition> derive;
   std::vector<std::string> drop;     ///< columns; '*' is any text
   std::vector<std::string> missing;  ///< cells of a CSV file where nothing was measured
-  std::size_t skip_lines = 0;        ///< lines of a CSV file above its header; 0: found by itself
-  std::string split_by;              ///< column; each run of equal values becomes a record
-  std::vector<double> keep;          ///< values of `split_by` that are kept; empty: all
+  std::string
+      decimal;  ///< "comma" or "point" before the decimals of a CSV file; empty: found by itself
+  std::size_t skip_lines = 0;  ///< lines of a CSV file above its header; 0: found by itself
+  std::string split_by;        ///< column; each run of equal values becomes a record
+  std::vector<double> keep;    ///< values of `split_by` that are kept; empty: all
   ClockRule clock;
   double rate_Hz = 0.0;  ///< sample rate of a log without clock; 0: not given
   // The part of the log that is used, from its first sample on.

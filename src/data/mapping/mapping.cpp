@@ -11,6 +11,7 @@
 #include "data/csv/csv_table.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
+#include "data/mapping/row_order.hpp"
 #include "data/marks_of_changes.hpp"
 #include "data/names.hpp"
 #include "data/record_clock.hpp"
@@ -199,6 +200,50 @@ Rows rows_with_held_values(const TableChannels& columns, const NamedRows& run,
   return rows;
 }
 
+std::string rows_and_verb(std::size_t rows, std::string_view of_one, std::string_view of_several) {
+  return rows == 1 ? fmt::format("1 row {}", of_one) : fmt::format("{} rows {}", rows, of_several);
+}
+
+/// Sorts the rows of each record that came late, and removes those that came twice. @returns how many rows remain.
+std::size_t sort_rows(LogTable& table, TableChannels& columns, std::vector<NamedRows>& records,
+                      std::size_t rows, const Mapping& mapping) {
+  // Values of other topics are held in the order in which messages arrived.
+  const auto is_held = [](const LogColumn& column) { return !column.fresh.empty(); };
+  if (!columns.clock || std::ranges::any_of(table.columns, is_held)) return rows;
+  std::vector<std::size_t> order;
+  RowOrder found;
+  std::size_t next = 0;
+  const auto keep_to = [&](std::size_t end) {
+    while (next < end) order.push_back(next++);
+  };
+  std::vector<NamedRows> sorted = records;
+  for (NamedRows& record : sorted) {
+    keep_to(record.rows.begin);
+    const std::size_t begin = order.size();
+    if (const auto of_record = find_row_order(columns, record.rows, mapping.clock.sort)) {
+      order.insert(order.end(), of_record->rows.begin(), of_record->rows.end());
+      next = record.rows.end;
+      found.late += of_record->late;
+      found.repeated += of_record->repeated;
+      found.furthest = std::max(found.furthest, of_record->furthest);
+    }
+    keep_to(record.rows.end);
+    record.rows = {.begin = begin, .end = order.size()};
+  }
+  keep_to(rows);
+  if (found.late == 0 && found.repeated == 0) return rows;
+  if (found.late > 0)
+    table.notes.push_back(
+        fmt::format("{} late, by up to {} rows: the rows are sorted by their time stamps",
+                    rows_and_verb(found.late, "comes", "come"), found.furthest));
+  if (found.repeated > 0)
+    table.notes.push_back(rows_and_verb(found.repeated, "that repeats another is not read",
+                                        "that repeat others are not read"));
+  put_in_order(table, columns, order);
+  records = std::move(sorted);
+  return order.size();
+}
+
 Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows run,
                        const Mapping& mapping, double rate_Hz) {
   const Rows all_rows = run.rows;
@@ -248,11 +293,13 @@ Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows 
 
 std::vector<Recording> measured_recordings(LogTable table, const Mapping& mapping, double rate_Hz,
                                            const std::string& name) {
-  const std::size_t rows = table.rows();  // the columns are moved out of the table
+  std::size_t rows = table.rows();  // the columns are moved out of the table
   TableChannels columns = channels_of_table(table, mapping);
+  std::vector<NamedRows> records = records_of(table, rows, mapping, name);
+  rows = sort_rows(table, columns, records, rows, mapping);
   std::vector<Recording> recordings;
-  for (const NamedRows& run : used_parts(records_of(table, rows, mapping, name), columns,
-                                         rows_between(columns, rows, mapping, rate_Hz), mapping))
+  for (const NamedRows& run :
+       used_parts(records, columns, rows_between(columns, rows, mapping, rate_Hz), mapping))
     recordings.push_back(recording_of(table, columns, run, mapping, rate_Hz));
   return recordings;
 }

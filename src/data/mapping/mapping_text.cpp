@@ -43,7 +43,7 @@ class MappingWriter {
   }
   void add(const ClockRule& clock) {
     if (!clock.rebuild && !(clock.resample_Hz > 0.0) && !(clock.split_at_gaps_s > 0.0) &&
-        clock.format.empty())
+        !clock.sort && clock.format.empty())
       return;
     yaml_ << YAML::Key << "clock" << YAML::Value << YAML::Flow << YAML::BeginMap;
     if (clock.rebuild) {
@@ -53,6 +53,7 @@ class MappingWriter {
     if (clock.resample_Hz > 0.0) entry("resample", digits(clock.resample_Hz));
     if (clock.max_gap_s > 0.0) entry("max_gap", digits(clock.max_gap_s));
     if (clock.split_at_gaps_s > 0.0) entry("split_at_gaps", digits(clock.split_at_gaps_s));
+    if (clock.sort) entry("sort", "true");
     if (!clock.format.empty()) entry("format", clock.format);
     yaml_ << YAML::EndMap;
   }
@@ -94,6 +95,7 @@ std::string mapping_text(const Mapping& mapping) {
   writer.map("derive", mapping.derive);
   writer.list("drop", mapping.drop);
   writer.list("missing", mapping.missing);
+  if (!mapping.decimal.empty()) writer.entry("decimal", mapping.decimal);
   if (mapping.skip_lines > 0) writer.entry("skip_lines", fmt::format("{}", mapping.skip_lines));
   if (!mapping.split_by.empty()) writer.entry("split_by", mapping.split_by);
   writer.add(mapping.clock);

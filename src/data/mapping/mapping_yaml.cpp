@@ -60,9 +60,11 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
 }
 
 ClockRule clock_rule(const YamlValue& yaml) {
-  yaml.allow_only({"rebuild", "max_stray_steps", "resample", "max_gap", "split_at_gaps", "format"});
+  yaml.allow_only(
+      {"rebuild", "max_stray_steps", "resample", "max_gap", "split_at_gaps", "sort", "format"});
   ClockRule rule;
   if (const auto rebuild = yaml.find("rebuild")) rule.rebuild = rebuild->boolean();
+  if (const auto sort = yaml.find("sort")) rule.sort = sort->boolean();
   if (const auto steps = yaml.find("max_stray_steps"))
     rule.max_stray_steps = steps->positive_number("1");
   if (const auto rate = yaml.find("resample")) rule.resample_Hz = rate->positive_number("Hz");
@@ -220,9 +222,9 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
                  .expected = "a mapping",
                  .found = "a manifest (it has files:)",
                  .advice = "Give a manifest in the place of a recording, without --mapping."});
-  of_joints.allow_only({"joints", "channels", "derive", "drop", "missing", "skip_lines", "split_by",
-                        "keep", "clock", "rate", "from", "to", "zero", "hold", "latency",
-                        "computed_from"});
+  of_joints.allow_only({"joints", "channels", "derive", "drop", "missing", "decimal", "skip_lines",
+                        "split_by", "keep", "clock", "rate", "from", "to", "zero", "hold",
+                        "latency", "computed_from"});
   const YamlValue yaml = of_joint(of_joints, joint);
   Mapping mapping;
   mapping.file = yaml.file();
@@ -234,6 +236,11 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
       mapping.derive.push_back(definition(name, expression));
   if (const auto drop = yaml.find("drop")) mapping.drop = drop->texts_or_empty();
   if (const auto missing = yaml.find("missing")) mapping.missing = missing->texts();
+  if (const auto decimal = yaml.find("decimal")) {
+    mapping.decimal = decimal->text();
+    if (mapping.decimal != "comma" && mapping.decimal != "point")
+      decimal->refuse("comma or point", "The other one of the two is then a thousands mark.");
+  }
   if (const auto lines = yaml.find("skip_lines")) mapping.skip_lines = lines->count();
   if (const auto split = yaml.find("split_by")) mapping.split_by = split->text();
   if (const auto keep = yaml.find("keep")) {
