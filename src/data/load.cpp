@@ -13,6 +13,7 @@
 
 #include "data/channel_names.hpp"
 #include "data/mapping/canonical_channels.hpp"
+#include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
 #include "data/mapping/needed_definitions.hpp"
 #include "data/names.hpp"
@@ -116,9 +117,23 @@ std::vector<std::string> columns_of(const Mapping& mapping) {
   return names;
 }
 
+/// Columns of the clock, of `split_by` and of masks: they have no numbers for what was not measured.
+std::vector<std::string> complete_columns(const Mapping& mapping) {
+  std::vector<std::string> names;
+  for (const ChannelRule& rule : mapping.channels) {
+    const auto name = split_channel_name(rule.name);
+    if ((name && name->unit->si_suffix == "s") || !marked_quantity(rule.name).empty())
+      names.push_back(rule.from);
+  }
+  if (!mapping.split_by.empty()) names.push_back(mapping.split_by);
+  return names;
+}
+
 CsvRules csv_rules(const Mapping& mapping) {
   return {.only_wanted = !mapping.channels.empty(),
           .missing = mapping.missing,
+          .complete = complete_columns(mapping),
+          .decimal = mapping.decimal,
           .skip_lines = mapping.skip_lines,
           .time_format = mapping.clock.format};
 }

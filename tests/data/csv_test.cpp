@@ -109,6 +109,58 @@ TEST(Csv, FurtherMarksOfMissingValuesAreTextsOrNumbers) {
   EXPECT_EQ(table.columns[0].values[2], 3.0);
 }
 
+TEST(Csv, NumbersForWhatIsMissingAreNumbersInTheClockAMaskAndWhatSplitsTheLog) {
+  const std::string csv = "t_ms,torque_Nm,torque_fresh_1,run,dt [s]\n0,5,0,0,0\n1,0,\"0\",0,0\n";
+  const LogTable table =
+      parse_csv(csv, "a.csv", {.rules = {.missing = {"0"}, .complete = {"run"}}});
+  for (const std::size_t column : {2U, 3U, 4U})
+    EXPECT_EQ(table.columns[column].values, (std::vector<double>{0.0, 0.0})) << column;
+  EXPECT_EQ(table.columns[0].values, (std::vector<double>{0.0, 1.0}));
+  EXPECT_EQ(table.columns[1].values[0], 5.0);
+  EXPECT_TRUE(std::isnan(table.columns[1].values[1]));
+}
+
+std::vector<double> first_column(const std::string& cells, const CsvRules& rules = {}) {
+  return parse_csv("a_1;b_1\n" + cells, "a.csv", {.rules = rules}).columns[0].values;
+}
+
+TEST(Csv, CommasBeforeThreeDigitsAreNotReadWithoutAProof) {
+  const std::string cells = "32,152;1\n-814;2\n-1,018;3\n";
+  const std::string message = test::error_message([&] { (void)first_column(cells); });
+  for (const char* part : {"a.csv: line 2, column 1 (a_1): the comma in '32,152'",
+                           "below 1000 numbers without a comma", "decimal: point  if it is 32152",
+                           "decimal: comma  if it is 32.152"})
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  EXPECT_EQ(first_column(cells, {.decimal = "point"}), (std::vector{32152.0, -814.0, -1018.0}));
+  EXPECT_EQ(first_column(cells, {.decimal = "comma"}), (std::vector{32.152, -814.0, -1.018}));
+  for (const char* other : {"1,234;0.5\n", "1,234;1.234\n", "1,234;2,345\n"})
+    EXPECT_THROW((void)first_column(other), Error) << other;
+}
+
+TEST(Csv, OneNumberProvesWhatTheCommasOfAFileAre) {
+  for (const char* proof : {"0,123", "1,5", "-,512", "1234,567", "1,234e1", "1,2345", "1.234,5"})
+    EXPECT_EQ(first_column(std::string("1,234;1\n2,345;") + proof + "\n3,456;1\n"),
+              (std::vector{1.234, 2.345, 3.456}))
+        << proof;
+  for (const char* proof : {"1,234,567", "1,234.5", "-12,345.6e3", "1,234."})
+    EXPECT_EQ(first_column(std::string("1,234;1\n-2,345;") + proof + "\n3,456;1\n"),
+              (std::vector{1234.0, -2345.0, 3456.0}))
+        << proof;
+  EXPECT_EQ(first_column("1.234,5;1\n2.345;2\n"), (std::vector{1234.5, 2345.0}));
+  EXPECT_THROW((void)first_column("1,234,567;0,5\n"), Error);
+  const LogTable quoted = parse_csv("a_1,b_1\n0.5,\"1,234.5\"\n1.234,\"2,345\"\n", "a.csv");
+  EXPECT_EQ(quoted.columns[0].values, (std::vector{0.5, 1.234}));
+  EXPECT_EQ(quoted.columns[1].values, (std::vector{1234.5, 2345.0}));
+  ASSERT_EQ(quoted.notes.size(), 1U);
+  EXPECT_NE(quoted.notes[0].find("commas are read as marks between thousands"), std::string::npos);
+}
+
+TEST(Csv, ANumberMustFitTheMarkThatIsStated) {
+  EXPECT_THROW((void)first_column("1,5;1\n", {.decimal = "point"}), Error);
+  EXPECT_THROW((void)first_column("0.5;1\n", {.decimal = "comma"}), Error);
+  EXPECT_EQ(first_column("1.234;1\n0,5;2\n", {.decimal = "comma"}), (std::vector{1234.0, 0.5}));
+}
+
 TEST(Csv, ADecimalCommaMayFollowExponentsAndTimes) {
   const LogTable table =
       parse_csv("t;a_1;b_1\n12:00:00,250;1e-05;0,5\n12:00:00,500;2;1,5\n", "a.csv");

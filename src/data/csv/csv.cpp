@@ -17,8 +17,10 @@
 #include "data/csv/decimal.hpp"
 #include "data/csv/line_reader.hpp"
 #include "data/csv/missing_mark.hpp"
+#include "data/csv/number_marks.hpp"
 #include "data/csv/time_stamp.hpp"
 #include "data/mapping/column_advice.hpp"
+#include "data/mapping/columns.hpp"
 #include "data/names.hpp"
 #include "data/read_budget.hpp"
 #include "torsio/core/error.hpp"
@@ -67,6 +69,11 @@ class TableParser {
       double value = 0.0;
       if (read_decimal(at, value) && *at == '\0') missing_numbers_.push_back(value);
     }
+    if (!options.rules.decimal.empty())
+      mark_ = options.rules.decimal == "comma" ? DecimalMark::comma : DecimalMark::point;
+    is_mark_stated_ = is_other_clear_ = mark_ != DecimalMark::unknown;
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      state_[i].is_complete = is_complete(columns_[i]);
     choose_columns();
   }
 
@@ -103,9 +110,10 @@ class TableParser {
         after = cell_end(at, end);
         value = unusual_cell({at, after}, number, i);
       } else {
-        if (may_have_commas() && std::string_view(at, after).find('.') != std::string_view::npos)
-          see_point(number, columns_[i]);
-        value = unless_missing(value, {at, after});
+        const std::string_view cell(at, after);
+        if (mark_ != DecimalMark::point && cell.find('.') != std::string_view::npos)
+          value = marked_number(cell, number, i);
+        value = unless_missing(value, cell, i);
       }
       columns_[i].values.push_back(value);
       at = after;
@@ -120,6 +128,7 @@ class TableParser {
   }
 
   void finish() {
+    finish_marks();
     finish_times();
     std::vector<std::string> left_out;
     std::vector<std::string> nameless;
@@ -160,8 +169,22 @@ class TableParser {
     bool is_read = true;
     bool is_left_out = false;  ///< because the mapping does not name it
     bool is_read_if_time = false;
+    bool is_complete = false;  ///< numbers for what was not measured are numbers here
     std::size_t time_stamps = 0;
   };
+
+  /// A cell whose comma may be before decimals or between thousands.
+  struct UnclearCell {
+    std::size_t column = 0;
+    std::size_t row = 0;
+  };
+
+  /// Whether it is the clock, a time, a mask, or a column that the mapping uses as one of them.
+  [[nodiscard]] bool is_complete(const LogColumn& column) const {
+    const auto name = split_channel_name(column.full_name());
+    return is_among(options_.rules.complete, column.name) ||
+           !marked_quantity(column.name).empty() || (name && name->unit->si_suffix == "s");
+  }
 
   void choose_columns() {
     std::map<std::string_view, std::size_t> seen;
@@ -213,26 +236,88 @@ class TableParser {
     return cell;
   }
 
-  /// Everything but a plain number: blanks, quotes, marks of what is missing, dates, a decimal comma.
+  /// Everything but a plain number: blanks, quotes, marks of what is missing, dates, commas.
   double unusual_cell(std::string_view whole, std::size_t line, std::size_t index) {
     const LogColumn& column = columns_[index];
     const std::string_view cell = stripped(whole);
     if (cell.empty() || cell == "nan" || cell == "NaN" || cell == "NAN") return kNotMeasured;
-    if (is_missing_mark(cell) || is_among(options_.rules.missing, cell)) return missing(cell);
+    if (is_missing_mark(cell) || (is_among(options_.rules.missing, cell) &&
+                                  !(state_[index].is_complete && is_decimal(std::string(cell)))))
+      return missing(cell);
     if (const auto stamp = time_stamp(cell)) return add_time(*stamp, line, index);
-    std::string text(cell);
-    if (const auto comma = text.find(','); comma != std::string::npos && separator_ != ',') {
-      if (point_seen_ || text.find('.') != std::string::npos) refuse_mixture(place(line, column));
-      text[comma] = '.';
-      comma_seen_ = true;
-    } else if (may_have_commas() && text.find('.') != std::string::npos) {
-      see_point(line, column);
-    }
+    if (cell.find_first_of(",.") != std::string_view::npos)
+      return unless_missing(marked_number(cell, line, index), cell, index);
+    const std::string text(cell);
     const char* at = text.c_str();
     double value = kNotMeasured;
     if (!read_decimal(at, value) || at != text.c_str() + text.size())
       refuse_cell(cell, place(line, column), column.name);
-    return unless_missing(value, cell);
+    return unless_missing(value, cell, index);
+  }
+
+  /// A number with commas or points. Until a number proves what they are, they are unclear.
+  double marked_number(std::string_view cell, std::size_t line, std::size_t index) {
+    const LogColumn& column = columns_[index];
+    const MarkedNumber number(cell);
+    if (!number.is_number()) refuse_cell(cell, place(line, column), column.name);
+    const bool has_comma = cell.find(',') != std::string_view::npos;
+    const bool has_point = cell.find('.') != std::string_view::npos;
+    // Between commas, a number with a comma is in quotes and one with a point is clear.
+    const bool is_clear = number.fits_point != number.fits_comma ||
+                          (separator_ == ',' && !has_comma && !is_mark_stated_);
+    if (is_clear) {
+      const DecimalMark shown = number.fits_point ? DecimalMark::point : DecimalMark::comma;
+      if (mark_ == DecimalMark::unknown) mark_ = shown;
+      if (mark_ != shown && is_mark_stated_)
+        refuse_other_mark(cell, place(line, column), options_.rules.decimal);
+      if (mark_ != shown) refuse_mixture(place(line, column));
+      if (mark_ == DecimalMark::comma && !unclear_point_.empty()) refuse_mixture(unclear_point_);
+      is_other_clear_ = is_other_clear_ || (mark_ == DecimalMark::point ? has_comma : has_point);
+    } else if (has_comma && mark_ != DecimalMark::comma && !is_other_clear_) {
+      if (unclear_.empty()) unclear_comma_ = {place(line, column), std::string(cell)};
+      budget_.keep(sizeof(UnclearCell));
+      unclear_.push_back({index, rows_});
+      return number.with_comma;
+    } else if (has_point && mark_ != DecimalMark::point && !is_other_clear_) {
+      if (mark_ == DecimalMark::comma) refuse_mixture(place(line, column));
+      if (unclear_point_.empty()) unclear_point_ = place(line, column);
+      return number.with_point;
+    }
+    const bool is_point = mark_ == DecimalMark::point;
+    if ((is_point ? has_comma : has_point) && example_of_other_.empty()) example_of_other_ = cell;
+    return is_point ? number.with_point : number.with_comma;
+  }
+
+  /// Gives the cells that were unclear at first the meaning that a later one proved.
+  void finish_marks() {
+    if (mark_ != DecimalMark::comma && !unclear_.empty()) {
+      if (!is_other_clear_) refuse_unclear_commas();
+      constexpr double kThousand = 1000.0;
+      for (const UnclearCell& cell : unclear_) {
+        double& value = columns_[cell.column].values[cell.row];
+        value = std::round(kThousand * value);
+      }
+    }
+    if (!example_of_other_.empty())
+      table_.notes.push_back(fmt::format(
+          "{} are read as marks between thousands, for example in '{}'",
+          mark_ == DecimalMark::point ? "commas" : "points", printable(example_of_other_)));
+  }
+
+  [[noreturn]] void refuse_unclear_commas() const {
+    const std::size_t column = unclear_.front().column;
+    std::vector<bool> is_unclear(rows_, false);
+    for (const UnclearCell& cell : unclear_)
+      if (cell.column == column) is_unclear[cell.row] = true;
+    bool has_small = false;
+    bool has_large = false;
+    for (std::size_t row = 0; row < rows_; ++row) {
+      if (is_unclear[row] || std::isnan(columns_[column].values[row])) continue;
+      constexpr double kThousand = 1000.0;
+      (std::abs(columns_[column].values[row]) < kThousand ? has_small : has_large) = true;
+    }
+    torsio::refuse_unclear_commas(unclear_comma_.cell, unclear_comma_.place,
+                                  has_small && !has_large);
   }
 
   double add_time(const TimeStamp& stamp, std::size_t line, std::size_t index) {
@@ -299,20 +384,10 @@ class TableParser {
     return kNotMeasured;
   }
 
-  double unless_missing(double value, std::string_view cell) {
-    const bool is_missing = !missing_numbers_.empty() &&
+  double unless_missing(double value, std::string_view cell, std::size_t index) {
+    const bool is_missing = !missing_numbers_.empty() && !state_[index].is_complete &&
                             std::ranges::find(missing_numbers_, value) != missing_numbers_.end();
     return is_missing ? missing(cell) : value;
-  }
-
-  /// Whether it is not known yet that numbers have decimal points.
-  [[nodiscard]] bool may_have_commas() const noexcept {
-    return separator_ != ',' && (comma_seen_ || !point_seen_);
-  }
-
-  void see_point(std::size_t line, const LogColumn& column) {
-    if (comma_seen_) refuse_mixture(place(line, column));
-    point_seen_ = true;
   }
 
   void mark(std::size_t line) {
@@ -355,8 +430,16 @@ class TableParser {
   std::size_t rows_ = 0;
   std::size_t last_line_ = 0;
   std::size_t header_again_ = 0;  ///< its first line; 0: none
-  bool comma_seen_ = false;
-  bool point_seen_ = false;
+  DecimalMark mark_ = DecimalMark::unknown;
+  bool is_mark_stated_ = false;
+  bool is_other_clear_ = false;       ///< the other mark is one between thousands
+  std::vector<UnclearCell> unclear_;  ///< while the mark is not known
+  struct {
+    std::string place;
+    std::string cell;
+  } unclear_comma_;               ///< the first one
+  std::string unclear_point_;     ///< place of the first one
+  std::string example_of_other_;  ///< the first cell with it
   bool has_local_times_ = false;
   bool has_empty_ends_ = false;
 };

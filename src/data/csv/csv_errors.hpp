@@ -13,6 +13,15 @@ namespace torsio {
 /// @throws Error at `place`: one of commas and points would be a thousands separator.
 [[noreturn]] void refuse_mixture(const std::string& place);
 
+/// @throws Error at `place` for a number whose marks are not those that the mapping states ("comma", "point").
+[[noreturn]] void refuse_other_mark(std::string_view cell, const std::string& place,
+                                    std::string_view stated);
+
+/// @throws Error at `place`: each comma of the file is followed by three digits, so it may precede decimals or
+/// separate thousands.
+[[noreturn]] void refuse_unclear_commas(std::string_view cell, const std::string& place,
+                                        bool is_only_above_thousand);
+
 /// What a row is compared with.
 struct HeaderSize {
   std::size_t names = 0;

@@ -9,6 +9,7 @@
 #include "core/trimmed.hpp"
 #include "data/csv/decimal.hpp"
 #include "data/csv/missing_mark.hpp"
+#include "data/csv/number_marks.hpp"
 #include "data/csv/time_stamp.hpp"
 #include "data/mapping/column_advice.hpp"
 #include "torsio/core/error.hpp"
@@ -33,7 +34,7 @@ void refuse_model(std::string_view first, LineReader& lines, const std::string& 
 }
 
 bool is_number_cell(const std::string& cell) {
-  return is_decimal(cell) || is_decimal_with_comma(cell);
+  return is_decimal(cell) || MarkedNumber(cell).is_number();
 }
 
 /// A line in the cells of its own separator.

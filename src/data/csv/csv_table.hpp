@@ -24,8 +24,11 @@ struct CsvRules {
   /// Whether columns without a unit are read only if they are wanted, or hold dates.
   bool only_wanted = false;
   std::vector<std::string> missing = {};  ///< further cells of what was not measured
-  std::size_t skip_lines = 0;             ///< lines before the header; 0: it is looked for
-  std::string time_format = {};           ///< how dates are written, for strptime; empty: ISO 8601
+  /// Columns in which each number is one, also those of `missing`: the clock, what splits the log, masks.
+  std::vector<std::string> complete = {};
+  std::string decimal = {};      ///< "comma" or "point"; empty: it is found
+  std::size_t skip_lines = 0;    ///< lines before the header; 0: it is looked for
+  std::string time_format = {};  ///< how dates are written, for strptime; empty: ISO 8601
 };
 
 struct CsvOptions {

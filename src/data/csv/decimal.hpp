@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -84,14 +83,6 @@ inline bool read_decimal(const char*& at, double& value) {
   const char* at = text.c_str();
   double value = 0.0;
   return read_decimal(at, value) && at == text.c_str() + text.size();
-}
-
-/// The same with a comma in the place of the decimal point.
-[[nodiscard]] inline bool is_decimal_with_comma(std::string_view cell) {
-  std::string text(cell);
-  if (std::ranges::count(text, ',') != 1 || text.find('.') != std::string::npos) return false;
-  std::ranges::replace(text, ',', '.');
-  return is_decimal(text);
 }
 
 }  // namespace torsio

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "data/csv/decimal.hpp"
+
+namespace torsio {
+
+/// The mark before the decimals of a file; the other one of the two then separates thousands.
+enum class DecimalMark : unsigned char { unknown, point, comma };
+
+/// A number in which `thousands` separates groups of three digits and `decimal` the decimals, with a point and without
+/// the groups. @returns whether it is one: groups are complete, do not begin with a zero, and are not followed by an exponent.
+[[nodiscard]] inline bool read_marked(std::string_view cell, char decimal, char thousands,
+                                      double& value) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::string text;
+  std::size_t i = 0;
+  if (i < cell.size() && (cell[i] == '-' || cell[i] == '+')) text += cell[i++];
+  const std::size_t first = i;
+  std::size_t group = 0;
+  bool has_groups = false;
+  for (; i < cell.size() && (is_digit(cell[i]) || cell[i] == thousands); ++i) {
+    if (is_digit(cell[i])) {
+      text += cell[i];
+      ++group;
+      continue;
+    }
+    if (group == 0 || group > 3 || cell[first] == '0' || (has_groups && group != 3)) return false;
+    has_groups = true;
+    group = 0;
+  }
+  if (has_groups && group != 3) return false;
+  bool has_decimals = false;
+  if (i < cell.size() && cell[i] == decimal) {
+    has_decimals = true;
+    text += '.';
+    ++i;
+  }
+  if (has_groups && !has_decimals && i < cell.size()) return false;
+  text += cell.substr(i);
+  const char* at = text.c_str();
+  return read_decimal(at, value) && at == text.c_str() + text.size() &&
+         (!has_decimals || text.find('.') == text.rfind('.'));
+}
+
+/// A number under both meanings of its commas and points.
+struct MarkedNumber {
+  double with_point = 0.0;  ///< the point is before the decimals
+  double with_comma = 0.0;
+  bool fits_point = false;
+  bool fits_comma = false;
+
+  explicit MarkedNumber(std::string_view cell)
+      : fits_point(read_marked(cell, '.', ',', with_point)),
+        fits_comma(read_marked(cell, ',', '.', with_comma)) {}
+  [[nodiscard]] bool is_number() const noexcept { return fits_point || fits_comma; }
+};
+
+}  // namespace torsio
