@@ -117,7 +117,7 @@ void EstimatorCore::limit(Conditioned& input) noexcept {
 void EstimatorCore::count_excursion(double first) noexcept {
   const double beyond = std::max(ranges_.front().lowest - first, first - ranges_.front().highest);
   if (!(beyond > first_width_)) {
-    // As fast as it comes back to the border, it may go on inside.
+    // As fast as it comes back to the border, it may continue inside.
     if (excursion_share_ > 0.0) excursion_ticks_ += kTicksPerReturn * kReturnInside;
     return;
   }
