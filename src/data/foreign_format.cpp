@@ -12,12 +12,14 @@
 namespace torsio {
 namespace {
 
-/// How a format is recognised, and what converts it: a function of pandas, or a command before the file.
+/// How a format is recognised, and what converts it: a function of pandas, a command before the file, or one that writes
+/// to the file after it.
 struct ForeignFormat {
   std::string_view mark;
   std::string_view name;
   std::string_view pandas = {};
   std::string_view command = {};
+  std::string_view ending = {};  ///< ending of the written file
 };
 
 constexpr auto kForeign = std::to_array<ForeignFormat>({
@@ -43,8 +45,23 @@ constexpr auto kForeign = std::to_array<ForeignFormat>({
      "python3 -c \"import numpy, sys; numpy.savez('log.npz', log=numpy.load(sys.argv[1]))\""},
     {"PK\x05\x06", "an empty ZIP archive"},
     {"ULog\x01", "a ULog file of PX4", {}, "ulog2csv"},
-    {"TDSm", "a TDMS file of LabVIEW", {}, "tdms convert --csv"},
-    {"MDF     ", "an MDF file", {}, "asammdf"},
+    {"TDSm",
+     "a TDMS file of LabVIEW",
+     {},
+     "python3 -c \"import nptdms, sys; nptdms.TdmsFile.read(sys.argv[1]).as_dataframe().to_csv("
+     "sys.argv[2], index=False)\"",
+     ".csv"},
+    {"MDF     ",
+     "an MDF file",
+     {},
+     "python3 -c \"import asammdf, sys; asammdf.MDF(sys.argv[1]).export('csv', sys.argv[2])\"",
+     ".csv"},
+    {"LabVIEW Measurement",
+     "a measurement file of LabVIEW (.lvm), with a header for each segment",
+     {},
+     R"(awk -F'\t' '/^X_Value/ { if (!n++) { sub(/\tComment\r?$/, ""); print } r = 1; next } )"
+     R"(/^(Channels|[*])/ { r = 0 } r && NF > 1')",
+     " > LOG.tsv"},
 });
 
 /// The first characters of an object or a list in JSON.
@@ -112,6 +129,10 @@ void refuse_foreign_format(std::string_view start, const std::string& path) {
     if (!format.pandas.empty()) advice = advice_by_pandas(format.pandas, path);
     if (!format.command.empty())
       advice = fmt::format("Convert it:  {} {}", format.command, shell_quoted(path));
+    if (format.ending.starts_with('.'))
+      advice += ' ' + shell_quoted(file_stem(path) + std::string(format.ending));
+    else
+      advice += format.ending;
     refuse(path, format.name, advice);
   }
   if (start.find_first_of("{[") != std::string_view::npos && is_json(start)) {

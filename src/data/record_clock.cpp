@@ -53,6 +53,55 @@ bool repeats_are_rows(const Stamps& stamps) {
   return true;
 }
 
+/// How many rows have each stamp, if always as many; 0: another number here and there.
+std::size_t rows_per_stamp(std::span<const double> stamps_s) {
+  const double first_s = stamps_s.front();
+  const auto rows = static_cast<std::size_t>(
+      std::ranges::find_if(stamps_s, [&](double stamp_s) { return stamp_s != first_s; }) -
+      stamps_s.begin());
+  for (std::size_t i = 1; i < stamps_s.size(); ++i)
+    if ((stamps_s[i] == stamps_s[i - 1]) != (i % rows != 0)) return 0;
+  return rows;
+}
+
+/// Rows of several joints, one after the other: a channel differs more between two rows of a stamp than from one stamp to
+/// the next.
+void refuse_several_joints(const Stamps& stamps) {
+  constexpr double kMore = 3.0;
+  constexpr std::size_t kFewestStamps = 10;
+  const std::size_t joints = rows_per_stamp(stamps.values_s);
+  if (joints < 2 || stamps.rows.size() < kFewestStamps * joints) return;
+  for (const TableChannel& column : stamps.columns.channels) {
+    const std::vector<double>& values = column.channel.values;
+    double within = 0.0;
+    double between = 0.0;
+    for (std::size_t i = stamps.rows.begin; i + joints < stamps.rows.end; ++i) {
+      const bool is_within = (i + 1 - stamps.rows.begin) % joints != 0;
+      const double change = std::abs(values[i + 1] - values[i]);
+      const double next = std::abs(values[i + joints] - values[i]);
+      if (!is_within || !std::isfinite(change) || !std::isfinite(next)) continue;
+      within += change;
+      between += next;
+    }
+    if (!(within > kMore * between) || !(between > 0.0)) continue;
+    throw ClockError(
+        {.place = stamps.place(1),
+         .problem =
+             fmt::format("{} rows have each time stamp, and {} changes more between them than "
+                         "from one stamp to the next: the rows of {} joints alternate",
+                         joints, column.channel.name, joints),
+         .expected = "the rows of one joint",
+         .found = fmt::format("{} s in {} rows", stamps.values_s.front(), joints),
+         .advice =
+             stamps.table.header_line == 0
+                 ? std::string("Save the signals of each joint in a file of their own.")
+                 : fmt::format(
+                       "Write the rows of each to a file, for example the first:  awk 'NR <= {0} "
+                       "|| (NR - {0}) % {1} == 1' LOG.csv > FIRST.csv",
+                       stamps.table.header_line, joints)});
+  }
+}
+
 /// An estimate of the log's rate, without its gaps; repeated stamps contribute only their number. 0: none
 double rate_of_steps(const Stamps& stamps) {
   constexpr double kSimple = 1e-3;
@@ -318,6 +367,7 @@ void refuse_unusable(const Stamps& stamps) {
          .found = "nothing",
          .advice = "Remove the line, or drop the clock column and give the rate."});
   }
+  refuse_several_joints(stamps);
   refuse_new_beginning(stamps);
   if (!(stamps.report.sample_rate_Hz > 0.0))
     throw ClockError(

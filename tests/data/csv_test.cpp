@@ -169,6 +169,54 @@ TEST(Csv, ADecimalCommaMayFollowExponentsAndTimes) {
   EXPECT_THROW((void)parse_csv("a_1;b_1\n1.0;2\n2,0;3\n", "a.csv"), Error);
 }
 
+TEST(Csv, NumbersInOtherSpellingsAreRead) {
+  const LogTable table =
+      parse_csv("a_1,b_1,c_1\n\u22121.5,0x1F,1.5D+03\n\u22122,-0xff,-0.25d-1\n", "a.csv");
+  EXPECT_EQ(table.columns[0].values, (std::vector{-1.5, -2.0}));
+  EXPECT_EQ(table.columns[1].values, (std::vector{31.0, -255.0}));
+  EXPECT_EQ(table.columns[2].values, (std::vector{1500.0, -0.025}));
+  for (const char* other : {"0x", "0xg", "0x12345678901234", "D3", "1D", "1d2d3", "dead"})
+    EXPECT_THROW((void)parse_csv(std::string("a_1\n1\n") + other + "\n", "a.csv"), Error) << other;
+}
+
+TEST(Csv, LinesMayEndInReturnsAlone) {
+  std::string text = "t_s,torque_Nm\r";
+  for (int i = 0; i < 20000; ++i) text += fmt::format("{},{}\r", i, 2 * i);
+  for (const std::string& log : {text, text.substr(0, text.size() - 1)}) {
+    const LogTable table = parse_csv(log, "a.csv");
+    ASSERT_EQ(table.rows(), 20000U);
+    EXPECT_EQ(table.columns[1].values.back(), 39998.0);
+    EXPECT_EQ(table.line_of(19999), 20001U);
+  }
+}
+
+TEST(Csv, RowsBeforeZeroBytesAtTheEndAreRead) {
+  const std::string rows = "a_1,b_1\n1,2\n3,4\n";
+  for (const std::string& end : {std::string(2000, '\0'), "5,6" + std::string(20, '\0')}) {
+    const LogTable table = parse_csv(rows + end, "a.csv");
+    EXPECT_EQ(table.columns[1].values, (std::vector{2.0, 4.0}));
+    EXPECT_TRUE(table.is_unfinished);
+    ASSERT_EQ(table.notes.size(), 1U);
+    EXPECT_NE(table.notes[0].find("line 4 has zero bytes"), std::string::npos) << table.notes[0];
+    const std::string message =
+        test::error_message([&] { (void)parse_csv(rows + end + "\n7,8\n", "a.csv"); });
+    EXPECT_NE(message.find("line 5"), std::string::npos) << message;
+  }
+}
+
+TEST(Csv, RowsWithoutAHeaderAndTimesOfASerialMonitorAreNamed) {
+  const auto message_of = [](const std::string& text) {
+    return test::error_message([&] { (void)parse_csv(text, "a.csv"); });
+  };
+  const std::string echo = "1700000000,0,,elbow,-0.17,0.5\n1700000000,10000000,,elbow,-0.18,0.6\n";
+  EXPECT_NE(message_of(echo).find("ros2 bag record"), std::string::npos) << message_of(echo);
+  const std::string row = "0.01,elbow,2.5\n0.02,elbow,2.6\n";
+  EXPECT_NE(message_of(row).find("a row of numbers"), std::string::npos) << message_of(row);
+  const std::string monitor = "14:03:10.010 -> t_s,a_rad\n14:03:10.020 -> 0.00,1\n";
+  EXPECT_NE(message_of(monitor).find("sed 's/^[0-9:.]* -> //'"), std::string::npos)
+      << message_of(monitor);
+}
+
 struct WrittenTime {
   std::string text;
   double time_s;

@@ -305,6 +305,22 @@ TEST(Mapping, EveryAdviceOnRowsInAnotherOrderLeadsToARecording) {
   }
 }
 
+TEST(Mapping, RowsOfSeveralJointsAreNotReadAsOne) {
+  std::string joints = "t_s,x_m\n";
+  std::string coarse = joints;
+  for (int i = 0; i < 100; ++i) {
+    joints +=
+        fmt::format("{0},{1:.5f}\n{0},{2:.5f}\n", 0.01 * i, std::sin(0.1 * i), 5.0 - 0.01 * i);
+    coarse += fmt::format("{0},{1:.5f}\n{0},{2:.5f}\n", 0.01 * i, std::sin(0.1 * i),
+                          std::sin(0.1 * i + 0.05));
+  }
+  for (const char* mapping : {"{}", "clock: {rebuild: true}", "clock: {resample: 100Hz}"}) {
+    const std::string message = test::error_message([&] { (void)read(joints, mapping); });
+    EXPECT_NE(message.find("the rows of 2 joints alternate"), std::string::npos) << message;
+  }
+  EXPECT_EQ(read(coarse, "clock: {rebuild: true}")[0].size(), 200U);
+}
+
 TEST(Mapping, ACounterThatOverflowsAndASecondLogAreNamedWhereTheyAre) {
   std::string counter = "t_us,x_m\n";
   for (int i = 0; i < 300; ++i) counter += fmt::format("{},{}\n", (i * 1000) % 65536, i);

@@ -245,6 +245,11 @@ class TableParser {
                                   !(state_[index].is_complete && is_decimal(std::string(cell)))))
       return missing(cell);
     if (const auto stamp = time_stamp(cell)) return add_time(*stamp, line, index);
+    double code = 0.0;
+    if (read_hexadecimal(cell, code)) return unless_missing(code, cell, index);
+    if (const std::string usual = usual_spelling(cell);
+        !usual.empty() && MarkedNumber(usual).is_number())
+      return unless_missing(marked_number(usual, line, index), cell, index);
     if (cell.find_first_of(",.") != std::string_view::npos)
       return unless_missing(marked_number(cell, line, index), cell, index);
     const std::string text(cell);
@@ -458,6 +463,18 @@ LogTable read_csv(ByteSource& source, const std::string& name, const CsvOptions&
   std::size_t gap_bytes = 0;
   const auto take = [&](std::string_view line, std::size_t number) {
     budget.read_to(source.bytes_read());
+    if (table.is_unfinished)
+      throw Error({.place = fmt::format("{}: line {}", name, number),
+                   .expected = "the end of the file, after zero bytes in the line before",
+                   .found = "a further line",
+                   .advice = "The file is damaged there: cut it in two files."});
+    if (line.find('\0') !=
+        std::string_view::npos) {  // a computer without power before it had written
+      table.is_unfinished = true;
+      table.notes.push_back(
+          fmt::format("line {} has zero bytes: it is not read, the rows before are", number));
+      return;
+    }
     constexpr std::size_t kTextPerElement = 16;  // comments of a packed file take time, too
     budget.work(1 + line.size() / kTextPerElement);
     if (!is_comment_or_blank(line)) {

@@ -46,6 +46,43 @@ void refuse_blanks(const std::vector<std::string>& names, std::string_view line,
                                "of the blanks:  sed 's/^ *//; s/  */,/g' LOG.txt > LOG.csv"});
 }
 
+/// The time that the serial monitor of Arduino writes before each line: "14:03:10.010 -> ".
+void refuse_monitor_times(std::string_view line, const std::string& place) {
+  const auto arrow = line.find(" -> ");
+  if (arrow == std::string_view::npos || line.find(':') > arrow ||
+      line.substr(0, arrow).find_first_not_of("0123456789:.") != std::string_view::npos)
+    return;
+  throw Error(
+      {.place = place,
+       .expected = "names of columns",
+       .found = "the time of a serial monitor: '" + printable(line.substr(0, arrow + 4)) + "'",
+       .advice = "Switch its time stamps off, or remove them:  sed 's/^[0-9:.]* -> //' LOG.txt "
+                 "> LOG.csv"});
+}
+
+/// Rows without names, some of whose cells are texts.
+void refuse_row(const std::vector<std::string>& cells, const std::string& place) {
+  const auto numbers = std::ranges::count_if(cells, is_decimal);
+  const bool has_decimals = std::ranges::any_of(cells, [](const std::string& cell) {
+    return is_decimal(cell) && cell.find('.') != std::string::npos;
+  });
+  if (2 * numbers <= std::ssize(cells) || !has_decimals) return;  // columns may be named by numbers
+  constexpr std::size_t kDigitsOfSeconds = 10;
+  const bool is_stamp = cells.size() > 2 && cells[0].size() == kDigitsOfSeconds &&
+                        is_decimal(cells[0]) && is_decimal(cells[1]) &&
+                        cells[0].find('.') == std::string::npos;
+  throw Error(
+      {.place = place,
+       .expected = "a header line with channel names",
+       .found = "a row of numbers: '" + printable(joined(cells)) + "'",
+       .advice = is_stamp
+                     ? "If it is the output of  ros2 topic echo --csv, record the topic by  ros2 "
+                       "bag record  instead, which keeps the names, or put a line with a name "
+                       "for each column first, and sum seconds and nanoseconds to one column."
+                     : "Put a line with a name for each column first, such as  "
+                       "t_s,angle_deg,torque_Nm"});
+}
+
 void refuse_open_quote(std::string_view line, const std::string& place) {
   if (std::ranges::count(line, '"') % 2 == 0) return;
   throw Error({.place = place,
@@ -60,6 +97,7 @@ void check_names(const std::vector<std::string>& names, const std::string& place
                  .found = "numbers: '" + printable(joined(names)) + "'",
                  .advice = "Put a line such as  t_s,angle_deg,torque_Nm  first; a header that "
                            "starts with '#' is read if it has as many names."});
+  refuse_row(names, place);
   if (std::ranges::all_of(names, [](const auto& name) { return name.empty(); }))
     throw Error({.place = place, .expected = "names of columns", .found = "empty cells"});
 }
@@ -138,6 +176,7 @@ CsvHeader parse_header(std::string_view line, const std::string& place) {
   CsvHeader header;
   header.separator = detect_separator(line);
   refuse_latin(line, place);
+  refuse_monitor_times(line, place);
   refuse_open_quote(line, place);
   header.names = cells_of(line, header.separator);
   refuse_blanks(header.names, line, place);

@@ -34,7 +34,9 @@ void refuse_model(std::string_view first, LineReader& lines, const std::string& 
 }
 
 bool is_number_cell(const std::string& cell) {
-  return is_decimal(cell) || MarkedNumber(cell).is_number();
+  double value = 0.0;
+  return is_decimal(cell) || MarkedNumber(cell).is_number() || read_hexadecimal(cell, value) ||
+         MarkedNumber(usual_spelling(cell)).is_number();
 }
 
 /// A line in the cells of its own separator.

@@ -15,7 +15,7 @@
 
 namespace torsio {
 
-/// Lines of a byte source with bounded memory. Each line is followed by a '\n' in memory, also the
+/// Lines of a byte source with bounded memory, that end in LF, CRLF or CR. Each is followed by its end in memory, also the
 /// last one, so that a parser needs no end check on digits.
 class LineReader {
  public:
@@ -26,10 +26,11 @@ class LineReader {
   bool next(std::string_view& line, std::size_t longest) {
     while (true) {
       const char* const begin = buffer_.data() + begin_;
-      const auto* const newline =
-          static_cast<const char*>(std::memchr(begin + searched_, '\n', end_ - begin_ - searched_));
+      const auto* const newline = static_cast<const char*>(
+          std::memchr(begin + searched_, line_end_, end_ - begin_ - searched_));
       const auto length =
           newline != nullptr ? static_cast<std::size_t>(newline - begin) : end_ - begin_;
+      if (newline == nullptr && number_ == 0 && ends_in_returns({begin, length})) continue;
       if (length > longest) refuse(length);
       if (newline == nullptr) {
         searched_ = length;
@@ -51,6 +52,16 @@ class LineReader {
 
  private:
   static constexpr std::size_t kChunk = std::size_t{1} << 16;
+
+  /// Whether lines end in a CR alone, as text that has one and is not followed by an LF shows.
+  bool ends_in_returns(std::string_view text) {
+    if (line_end_ == '\r' || text.empty() ||
+        text.substr(0, text.size() - 1).find('\r') == std::string_view::npos)
+      return false;
+    line_end_ = '\r';
+    searched_ = 0;
+    return true;
+  }
 
   bool fill() {
     std::move(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_),
@@ -77,6 +88,7 @@ class LineReader {
   std::size_t end_ = 0;
   std::size_t searched_ = 0;  ///< bytes after begin_ without a line end
   std::size_t number_ = 0;
+  char line_end_ = '\n';
 };
 
 }  // namespace torsio

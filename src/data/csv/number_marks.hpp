@@ -1,7 +1,11 @@
 #pragma once
 
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "data/csv/decimal.hpp"
 
@@ -43,6 +47,40 @@ enum class DecimalMark : unsigned char { unknown, point, comma };
   const char* at = text.c_str();
   return read_decimal(at, value) && at == text.c_str() + text.size() &&
          (!has_decimals || text.find('.') == text.rfind('.'));
+}
+
+/// A number with the minus sign of Unicode or the exponent of Fortran (1.5D+03), in the usual spelling; nothing if it has
+/// neither.
+[[nodiscard]] inline std::string usual_spelling(std::string_view cell) {
+  constexpr std::string_view kMinus = "\xe2\x88\x92";
+  std::string text(cell);
+  bool is_other = false;
+  for (auto at = text.find(kMinus); at != std::string::npos; at = text.find(kMinus)) {
+    text.replace(at, kMinus.size(), "-");
+    is_other = true;
+  }
+  const auto exponent = text.find_first_of("dD");
+  if (exponent != std::string::npos && exponent > 0 &&
+      text.find_first_not_of("+-0123456789.,dD") == std::string::npos) {
+    text[exponent] = 'e';
+    is_other = true;
+  }
+  return is_other ? text : std::string();
+}
+
+/// A whole number in hexadecimal digits, such as 0x1F or -0x1f.
+[[nodiscard]] inline bool read_hexadecimal(std::string_view cell, double& value) {
+  constexpr std::size_t kMaxDigits = 13;  // exact
+  const bool is_negative = cell.starts_with('-');
+  if (is_negative) cell.remove_prefix(1);
+  if (!cell.starts_with("0x") && !cell.starts_with("0X")) return false;
+  cell.remove_prefix(2);
+  std::uint64_t number = 0;
+  const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), number, 16);
+  if (code != std::errc() || end != cell.data() + cell.size() || cell.size() > kMaxDigits)
+    return false;
+  value = (is_negative ? -1.0 : 1.0) * static_cast<double>(number);
+  return true;
 }
 
 /// A number under both meanings of its commas and points.
