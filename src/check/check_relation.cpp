@@ -170,7 +170,11 @@ void Checker::check_units_within(std::size_t r) {
   const bool are_angles = is_angle(sources_[0]) && is_angle(sources_[1]);
   const double ratio = std::max(slope, 1.0 / slope);
   const std::string_view mistake = unit_mistake(slope, are_angles);
-  if (mistake.empty() && !(are_angles && ratio >= kLowestGearRatio)) return;
+  // With a locked gear the joint alone turns, and the torque follows.
+  const bool is_without_ratio =
+      are_angles && ratio >= kLowestGearRatio &&
+      std::abs(correlation(pairs_[r].input, pairs_[r].target)) < kTogether;
+  if (mistake.empty() && !is_without_ratio) return;
   spoiled_[r] = 1;
   const std::string& further = slope > 1.0 ? sources_[1] : sources_[0];
   const std::string& other = slope > 1.0 ? sources_[0] : sources_[1];

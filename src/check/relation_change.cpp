@@ -302,35 +302,33 @@ std::optional<SwitchedOff> find_switched_off(const Pair& pair) {
   const double range = extent_of(pair.target).width();
   const auto size = static_cast<std::size_t>(target.size());
   const auto begin_of = [&](std::size_t part) { return size * part / kOffParts; };
-  const auto range_in = [&](const Eigen::VectorXd& values, std::size_t part, std::size_t parts) {
+  const auto range_in = [&](const Eigen::VectorXd& values, std::size_t part) {
     const auto begin = static_cast<Eigen::Index>(begin_of(part));
-    return range_of(
-        values.segment(begin, static_cast<Eigen::Index>(begin_of(part + parts)) - begin));
+    return range_of(values.segment(begin, static_cast<Eigen::Index>(begin_of(part + 1)) - begin));
   };
   struct Part {
     double expected = 0.0;
     bool is_off = false;
   };
-  std::array<Part, kOffParts - 1> parts;  // with the next one
+  std::array<Part, kOffParts> parts;
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    parts[k].expected = range_in(curve, k, 2);
+    parts[k].expected = range_in(curve, k);
     parts[k].is_off = parts[k].expected >= kOffExpected * range &&
-                      range_in(target, k, 2) <= kOffPassed * parts[k].expected;
+                      range_in(target, k) <= kOffPassed * parts[k].expected;
   }
   const auto first = std::ranges::find(parts, true, &Part::is_off);
   if (first == parts.end()) return {};
   // As far as the target remains as quiet, also where the motion turns.
   SwitchedOff off;
   std::size_t begin = static_cast<std::size_t>(first - parts.begin());
-  std::size_t end = begin + 2;
+  std::size_t end = begin + 1;
   const auto is_quiet = [&](std::size_t part) {
-    return range_in(target, part, 1) <= kOffPassed * first->expected;
+    return range_in(target, part) <= kOffPassed * first->expected;
   };
   while (begin > 0 && is_quiet(begin - 1)) --begin;
   while (end < kOffParts && is_quiet(end)) ++end;
-  const auto off_elsewhere =
-      std::any_of(parts.begin() + static_cast<std::ptrdiff_t>(std::min(end, parts.size())),
-                  parts.end(), [](const Part& part) { return part.is_off; });
+  const auto off_elsewhere = std::any_of(parts.begin() + static_cast<std::ptrdiff_t>(end),
+                                         parts.end(), [](const Part& part) { return part.is_off; });
   if (end - begin > kMaxOff || off_elsewhere) return {};
   const auto begin_row = static_cast<Eigen::Index>(begin_of(begin));
   const auto end_row = static_cast<Eigen::Index>(begin_of(end));

@@ -33,7 +33,7 @@ struct SwitchedOff {
   double passed = 0.0;    ///< range that the target passes through in it
   double expected = 0.0;  ///< the same elsewhere, at equal inputs and speeds
 };
-/// The recording is divided into twenty parts; in two successive ones the target passes through less than a tenth of what the curve with
+/// The recording is divided into twenty parts; in one the target passes through less than a tenth of what the curve with
 /// hysteresis passes through, and that is at least a tenth of the range of the target. The neighbours in which it is as
 /// quiet belong to it. Empty if these are more than six, if it happens elsewhere, or if the target passes through as
 /// little elsewhere at equal inputs and speeds: then it is a backlash or a contact that opened.
