@@ -39,7 +39,7 @@ constexpr Eigen::Index kFree = 4 + static_cast<Eigen::Index>(kDelayHinges.size()
 constexpr Eigen::Index kColumns =
     kFree + static_cast<Eigen::Index>(kDelayStops + kLoadedStops.size() + kRelaxations_s.size());
 constexpr std::size_t kParts = 4;
-constexpr std::size_t kStrokesOfADrift = 5;
+constexpr std::size_t kStrokesOfADrift = 10;
 constexpr double kSpeedHalfWindow_s = 0.02;
 constexpr double kScaleShare = 0.1;
 constexpr double kScaleRest = 2e-3;  ///< a torque that changed its gain leaves more
