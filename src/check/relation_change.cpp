@@ -316,11 +316,11 @@ std::optional<SwitchedOff> find_switched_off(const Pair& pair) {
     parts[k].is_off = parts[k].expected >= kOffExpected * range &&
                       range_in(target, k) <= kOffPassed * parts[k].expected;
   }
-  const auto first = std::ranges::find(parts, true, &Part::is_off);
+  const auto* const first = std::ranges::find(parts, true, &Part::is_off);
   if (first == parts.end()) return {};
   // As far as the target remains as quiet, also where the motion turns.
   SwitchedOff off;
-  std::size_t begin = static_cast<std::size_t>(first - parts.begin());
+  auto begin = static_cast<std::size_t>(first - parts.begin());
   std::size_t end = begin + 1;
   const auto is_quiet = [&](std::size_t part) {
     return range_in(target, part) <= kOffPassed * first->expected;

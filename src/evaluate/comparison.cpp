@@ -165,6 +165,7 @@ std::vector<std::string> warnings_of(const std::vector<ScoredModel>& models) {
     }
   }
   std::vector<std::string> warnings;
+  warnings.reserve(found.size());
   for (const auto& [text, labels] : found) warnings.push_back(fmt::format("{}: {}", labels, text));
   return warnings;
 }

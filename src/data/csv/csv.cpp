@@ -79,8 +79,8 @@ class TableParser {
 
   /// Whether a line is the header or the row of units once more: a logger that was started twice writes both again.
   [[nodiscard]] bool is_header_again(std::string_view line) const {
-    const unsigned char first = static_cast<unsigned char>(line.front());
-    if (std::isalpha(first) == 0 && first != '"' && first != '[' && first != separator_)
+    const auto first = static_cast<unsigned char>(line.front());
+    if (std::isalpha(first) == 0 && first != '"' && first != '[' && line.front() != separator_)
       return false;
     const std::vector<std::string> cells = cells_of(line, separator_);
     return cells == start_.header.names || cells == start_.units;

@@ -220,6 +220,7 @@ void note_on_rates(std::vector<std::string>& notes, const Design& design, const 
   if (!(without > kNegligible * (squares - sum * sum / count))) return;
   if (!(std::sqrt(with) <= kWorthANote * std::sqrt(without))) return;
   std::vector<std::string> names;
+  names.reserve(rates.size());
   for (const std::size_t j : rates) names.push_back(data.inputs[j].expression);
   notes.push_back(fmt::format(
       "warning: {0} has no slope over rates ({1}); with them, the RMSE of the training would be "
