@@ -15,6 +15,7 @@
 #include "data/finest_step.hpp"
 #include "data/recording_rows.hpp"
 #include "fit/common/passes.hpp"
+#include "numerics/golden_section.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -155,15 +156,10 @@ bool is_filtered_line(const Dataset& dataset, const FeatureSpec& spec) {
   double least = 1.0;
   for (int k = 0; k < kShares; ++k)
     if (const double left = left_at(-k * step); left < least) least = left, best = -k * step;
-  double low = best - step;
-  double high = std::min(best + step, 0.0);
-  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
-  for (int k = 0; k < kShares; ++k) {
-    const double left = high - ratio * (high - low);
-    const double right = low + ratio * (high - low);
-    (left_at(left) < left_at(right) ? high : low) = left_at(left) < left_at(right) ? right : left;
-  }
-  const LineSums line = filtered_line(inputs, std::exp(0.5 * (low + high)));
+  constexpr double kTolerance = 1e-7;
+  const LineSums line = filtered_line(
+      inputs,
+      std::exp(golden_section(left_at, best - step, std::min(best + step, 0.0), kTolerance)));
   FeatureSpec first = spec;
   first.inputs.resize(1);
   const FeaturePipeline pipeline(first, dataset.sample_rate_Hz());

@@ -9,6 +9,7 @@
 #include "fit/common/regression.hpp"
 #include "fit/common/usable_table.hpp"
 #include "fit/linear/named_coefficients.hpp"
+#include "numerics/golden_section.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/error.hpp"
 
@@ -46,18 +47,20 @@ class FrictionSearch {
   /// The scale between `lowest` and `highest` that leaves least.
   [[nodiscard]] double best_scale(double lowest, double highest) const {
     const double step = std::log(highest / lowest) / (kGridPoints - 1);
-    const auto gain_at = [&](double position) { return gain(lowest * std::exp(position * step)); };
+    const auto loss_at = [&](double position) { return -gain(lowest * std::exp(position * step)); };
     int best = 0;
-    double best_gain = -1.0;
+    double least = 1.0;
     for (int i = 0; i < kGridPoints; ++i) {
-      const double here = gain_at(i);
-      if (here > best_gain) {
+      const double here = loss_at(i);
+      if (here < least) {
         best = i;
-        best_gain = here;
+        least = here;
       }
     }
-    return lowest * std::exp(step * golden_section(gain_at, std::max(best - 1, 0),
-                                                   std::min(best + 1, kGridPoints - 1)));
+    constexpr double kTolerance = 1e-6;  // share of a step of the grid
+    return lowest *
+           std::exp(step * golden_section(loss_at, std::max(best - 1, 0),
+                                          std::min(best + 1, kGridPoints - 1), kTolerance));
   }
 
  private:
@@ -66,29 +69,6 @@ class FrictionSearch {
     std::vector<double> target;
     std::vector<double> rate;
   };
-
-  template <class Function>
-  static double golden_section(const Function& gain_at, double low, double high) {
-    const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
-    double left = high - ratio * (high - low);
-    double right = low + ratio * (high - low);
-    double gain_left = gain_at(left);
-    double gain_right = gain_at(right);
-    while (high - low > 1e-6) {
-      if (gain_left > gain_right) {
-        high = std::exchange(right, left);
-        gain_right = gain_left;
-        left = high - ratio * (high - low);
-        gain_left = gain_at(left);
-      } else {
-        low = std::exchange(left, right);
-        gain_left = gain_right;
-        right = low + ratio * (high - low);
-        gain_right = gain_at(right);
-      }
-    }
-    return 0.5 * (low + high);
-  }
 
   /// (f . y)^2 / f . f for the part f of the friction column that the basis does not hold.
   [[nodiscard]] static double gain(const Group& group, double scale) {

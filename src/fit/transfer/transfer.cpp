@@ -18,6 +18,7 @@
 #include "fit/transfer/output_map.hpp"
 #include "fit/transfer/refit.hpp"
 #include "numerics/centred_sums.hpp"
+#include "numerics/golden_section.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/train_model.hpp"
 
@@ -27,8 +28,8 @@ namespace {
 constexpr std::size_t kLeastSamples = 50;
 constexpr double kWidestScale =
     30.0;  // end of the search for a scale of the inputs; its inverse is the other
-constexpr std::size_t kScales = 40;  // on a logarithmic grid, then refined
-constexpr int kRefinements = 20;
+constexpr std::size_t kScales = 40;       // on a logarithmic grid, then refined
+constexpr double kScaleTolerance = 1e-4;  ///< share of a step of the grid
 constexpr double kClearly = 0.95;
 constexpr std::string_view kPlace = "transfer";
 
@@ -268,19 +269,8 @@ class Transfer {
         best = at;
       }
     }
-    constexpr double kGolden = 0.3819660112501051;
-    double low = best - step;
-    double high = best + step;
-    for (int i = 0; i < kRefinements; ++i) {
-      const double left = low + kGolden * (high - low);
-      const double right = high - kGolden * (high - low);
-      if (line_at(left).error < line_at(right).error) {
-        high = right;
-      } else {
-        low = left;
-      }
-    }
-    const double at = 0.5 * (low + high);
+    const auto error_at = [&](double log_scale) { return line_at(log_scale).error; };
+    const double at = golden_section(error_at, best - step, best + step, kScaleTolerance * step);
     const Line line = line_at(at);
     return {.input_scale = std::exp(at), .gain = line.gain, .offset = line.offset};
   }
