@@ -15,6 +15,7 @@
 #include "data/csv/csv_start.hpp"
 #include "data/csv/csv_table.hpp"
 #include "data/csv/decimal.hpp"
+#include "data/csv/decimal_marks.hpp"
 #include "data/csv/line_reader.hpp"
 #include "data/csv/missing_mark.hpp"
 #include "data/csv/number_marks.hpp"
@@ -52,7 +53,8 @@ class TableParser {
         separator_(start.header.separator),
         options_(options),
         budget_(budget),
-        state_(start.header.names.size()) {
+        state_(start.header.names.size()),
+        marks_(table.source.file, options.rules.decimal, start.header.separator, budget) {
     for (std::size_t i = 0; i < state_.size(); ++i) {
       columns_.push_back({.name = start.header.names[i], .number = i + 1, .values = {}});
       const std::string unit_cell = i < start.units.size() ? start.units[i] : std::string();
@@ -69,9 +71,6 @@ class TableParser {
       double value = 0.0;
       if (read_decimal(at, value) && *at == '\0') missing_numbers_.push_back(value);
     }
-    if (!options.rules.decimal.empty())
-      mark_ = options.rules.decimal == "comma" ? DecimalMark::comma : DecimalMark::point;
-    is_mark_stated_ = is_other_clear_ = mark_ != DecimalMark::unknown;
     for (std::size_t i = 0; i < columns_.size(); ++i)
       state_[i].is_complete = is_complete(columns_[i]);
     choose_columns();
@@ -111,7 +110,7 @@ class TableParser {
         value = unusual_cell({at, after}, number, i);
       } else {
         const std::string_view cell(at, after);
-        if (mark_ != DecimalMark::point && cell.find('.') != std::string_view::npos)
+        if (!marks_.is_point() && cell.find('.') != std::string_view::npos)
           value = marked_number(cell, number, i);
         value = unless_missing(value, cell, i);
       }
@@ -128,7 +127,8 @@ class TableParser {
   }
 
   void finish() {
-    finish_marks();
+    marks_.finish(columns_, rows_);
+    if (const std::string note = marks_.note(); !note.empty()) table_.notes.push_back(note);
     finish_times();
     std::vector<std::string> left_out;
     std::vector<std::string> nameless;
@@ -171,12 +171,6 @@ class TableParser {
     bool is_read_if_time = false;
     bool is_complete = false;  ///< numbers for what was not measured are numbers here
     std::size_t time_stamps = 0;
-  };
-
-  /// A cell whose comma may be before decimals or between thousands.
-  struct UnclearCell {
-    std::size_t column = 0;
-    std::size_t row = 0;
   };
 
   /// Whether it is the clock, a time, a mask, or a column that the mapping uses as one of them.
@@ -260,69 +254,10 @@ class TableParser {
     return unless_missing(value, cell, index);
   }
 
-  /// A number with commas or points. Until a number proves what they are, they are unclear.
+  /// A number with commas or points.
   double marked_number(std::string_view cell, std::size_t line, std::size_t index) {
-    const LogColumn& column = columns_[index];
-    const MarkedNumber number(cell);
-    if (!number.is_number()) refuse_cell(cell, place(line, column), column.name);
-    const bool has_comma = cell.find(',') != std::string_view::npos;
-    const bool has_point = cell.find('.') != std::string_view::npos;
-    // Between commas, a number with a comma is in quotes and one with a point is clear.
-    const bool is_clear = number.fits_point != number.fits_comma ||
-                          (separator_ == ',' && !has_comma && !is_mark_stated_);
-    if (is_clear) {
-      const DecimalMark shown = number.fits_point ? DecimalMark::point : DecimalMark::comma;
-      if (mark_ == DecimalMark::unknown) mark_ = shown;
-      if (mark_ != shown && is_mark_stated_)
-        refuse_other_mark(cell, place(line, column), options_.rules.decimal);
-      if (mark_ != shown) refuse_mixture(place(line, column));
-      if (mark_ == DecimalMark::comma && !unclear_point_.empty()) refuse_mixture(unclear_point_);
-      is_other_clear_ = is_other_clear_ || (mark_ == DecimalMark::point ? has_comma : has_point);
-    } else if (has_comma && mark_ != DecimalMark::comma && !is_other_clear_) {
-      if (unclear_.empty()) unclear_comma_ = {place(line, column), std::string(cell)};
-      budget_.keep(sizeof(UnclearCell));
-      unclear_.push_back({index, rows_});
-      return number.with_comma;
-    } else if (has_point && mark_ != DecimalMark::point && !is_other_clear_) {
-      if (mark_ == DecimalMark::comma) refuse_mixture(place(line, column));
-      if (unclear_point_.empty()) unclear_point_ = place(line, column);
-      return number.with_point;
-    }
-    const bool is_point = mark_ == DecimalMark::point;
-    if ((is_point ? has_comma : has_point) && example_of_other_.empty()) example_of_other_ = cell;
-    return is_point ? number.with_point : number.with_comma;
-  }
-
-  /// Gives the cells that were unclear at first the meaning that a later one proved.
-  void finish_marks() {
-    if (mark_ != DecimalMark::comma && !unclear_.empty()) {
-      if (!is_other_clear_) refuse_unclear_commas();
-      constexpr double kThousand = 1000.0;
-      for (const UnclearCell& cell : unclear_) {
-        double& value = columns_[cell.column].values[cell.row];
-        value = std::round(kThousand * value);
-      }
-    }
-    if (!example_of_other_.empty())
-      table_.notes.push_back(fmt::format(
-          "{} are read as marks between thousands, for example in '{}'",
-          mark_ == DecimalMark::point ? "commas" : "points", printable(example_of_other_)));
-  }
-
-  [[noreturn]] void refuse_unclear_commas() const {
-    const std::size_t column = unclear_.front().column;
-    std::vector<bool> is_unclear(rows_, false);
-    for (const UnclearCell& cell : unclear_)
-      if (cell.column == column) is_unclear[cell.row] = true;
-    bool has_small = false;
-    bool has_large = false;
-    for (std::size_t row = 0; row < rows_; ++row) {
-      if (is_unclear[row] || std::isnan(columns_[column].values[row])) continue;
-      constexpr double kThousand = 1000.0;
-      (std::abs(columns_[column].values[row]) < kThousand ? has_small : has_large) = true;
-    }
-    torsio::refuse_unclear_commas(unclear_comma_.cell, unclear_comma_.place,
-                                  has_small && !has_large);
+    return marks_.number_of(
+        {.text = cell, .line = line, .row = rows_, .index = index, .column = columns_[index]});
   }
 
   double add_time(const TimeStamp& stamp, std::size_t line, std::size_t index) {
@@ -402,8 +337,7 @@ class TableParser {
   }
 
   [[nodiscard]] std::string place(std::size_t line, const LogColumn& column) const {
-    return fmt::format("{}: line {}, column {} ({})", table_.source.file, line, column.number,
-                       column.name);
+    return csv_place(table_.source.file, line, column);
   }
 
   /// Many programs write a separator after the last cell, but none in the header.
@@ -435,16 +369,7 @@ class TableParser {
   std::size_t rows_ = 0;
   std::size_t last_line_ = 0;
   std::size_t header_again_ = 0;  ///< its first line; 0: none
-  DecimalMark mark_ = DecimalMark::unknown;
-  bool is_mark_stated_ = false;
-  bool is_other_clear_ = false;       ///< the other mark is one between thousands
-  std::vector<UnclearCell> unclear_;  ///< while the mark is not known
-  struct {
-    std::string place;
-    std::string cell;
-  } unclear_comma_;               ///< the first one
-  std::string unclear_point_;     ///< place of the first one
-  std::string example_of_other_;  ///< the first cell with it
+  DecimalMarks marks_;
   bool has_local_times_ = false;
   bool has_empty_ends_ = false;
 };

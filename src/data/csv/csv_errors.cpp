@@ -14,10 +14,8 @@ namespace {
 
 constexpr const char* kAdviceOnCommas =
     "If the numbers have commas, export the log again with semicolons or tabs between the cells, "
-    "and "
-    "write in a mapping  decimal: comma  if decimals follow the commas, or  decimal: point  if "
-    "they "
-    "separate thousands. Otherwise correct the line.";
+    "and write in a mapping  decimal: comma  if decimals follow the commas, or  decimal: point  if "
+    "they separate thousands. Otherwise correct the line.";
 
 /// Digits with commas or points at places where they mean nothing, such as 1,23,456.
 bool is_like_marked_number(std::string_view cell) {
@@ -41,6 +39,10 @@ std::string advice_on_cell(std::string_view cell, std::string_view column) {
 }
 
 }  // namespace
+
+std::string csv_place(const std::string& file, std::size_t line, const LogColumn& column) {
+  return fmt::format("{}: line {}, column {} ({})", file, line, column.number, column.name);
+}
 
 void refuse_cell(std::string_view cell, const std::string& place, std::string_view column) {
   throw Error({.place = place,

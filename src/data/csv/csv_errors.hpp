@@ -4,7 +4,13 @@
 #include <string>
 #include <string_view>
 
+#include "data/log_table.hpp"
+
 namespace torsio {
+
+/// The place of a cell in messages.
+[[nodiscard]] std::string csv_place(const std::string& file, std::size_t line,
+                                    const LogColumn& column);
 
 /// @throws Error at `place` for a cell that is neither a number nor a known text.
 [[noreturn]] void refuse_cell(std::string_view cell, const std::string& place,
