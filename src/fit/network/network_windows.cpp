@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -228,6 +229,27 @@ WindowSet make_windows(const TrainingData& data, std::span<const SequencePart> p
     });
   }
   return set;
+}
+
+double linear_loss(const WindowSet& set) {
+  const auto columns = static_cast<Eigen::Index>(set.inputs + 1);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
+  Eigen::VectorXd moment = Eigen::VectorXd::Zero(columns);
+  Eigen::VectorXd row = Eigen::VectorXd::Ones(columns);
+  double squares = 0.0;
+  double count = 0.0;
+  for (std::size_t n = 0; n < set.targets.size(); ++n) {
+    if (set.use[n] == 0) continue;
+    for (std::size_t j = 0; j < set.inputs; ++j)
+      row(static_cast<Eigen::Index>(j)) = static_cast<double>(set.features[n * set.inputs + j]);
+    const auto target = static_cast<double>(set.targets[n]);
+    normal += row * row.transpose();
+    moment += target * row;
+    squares += target * target;
+    count += 1.0;
+  }
+  const Eigen::VectorXd solution = normal.completeOrthogonalDecomposition().solve(moment);
+  return count > 0.0 ? std::max(0.0, (squares - solution.dot(moment)) / count) : 0.0;
 }
 
 }  // namespace torsio

@@ -62,4 +62,7 @@ struct TrainingSplit {
 [[nodiscard]] WindowSet make_windows(const TrainingData& data, std::span<const SequencePart> parts,
                                      const NetworkScaling& scaling, const TrainingWindows& windows);
 
+/// The mean square error of a linear model of the samples in the loss, fitted to them.
+[[nodiscard]] double linear_loss(const WindowSet& set);
+
 }  // namespace torsio
