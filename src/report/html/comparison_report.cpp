@@ -52,7 +52,6 @@ ReportSection ranking_section(const Results& results, Role split) {
   for (const Ranking& ranking : results.rankings)
     if (ranking.split == split)
       if (const std::string note = ranking_note(ranking); !note.empty()) section.text += " " + note;
-  for (const std::string& warning : results.warnings) section.text += " " + warning + ".";
   if (!ranked.others.empty()) {
     ReportTable others{
         .title = "Not in the ranking", .headings = {"model", "why"}, .rows = {}, .is_words = true};
@@ -125,6 +124,8 @@ ReportDocument comparison_report(const Comparison& comparison, const Dataset& da
             ? ""
             : fmt::format("; {} more could not be ranked", ranked.others.size())));
   }
+  for (const std::string& warning : results.warnings)
+    document.summary.push_back("Warning: " + warning + ".");
   for (const Role role : {Role::validation, Role::test})
     if (std::ranges::any_of(results.rows, [&](const ResultRow& row) { return row.split == role; }))
       document.sections.push_back(ranking_section(results, role));
