@@ -171,8 +171,7 @@ void Checker::check_leak() {
         fmt::format("{} is {} times a constant, within their digits: it was not measured",
                     dataset_.target, channel),
         "A torque of a motor current contains the friction of motor and gear. Record one with a "
-        "torque "
-        "sensor.");
+        "torque sensor.");
 }
 
 /// Channels besides the inputs that the target was computed from.

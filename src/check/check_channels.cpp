@@ -109,16 +109,16 @@ void Checker::check_saturation() {
     for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
       const Extent span = extent_of(channel.values);
       if (!(span.width() > 0.0)) return;
-      const auto returning = find_returning_value(channel, kSpikeShare * span.width());
       // A motion that turns within the last of few codes rests there, too.
       const double by_code = kCodesAtATurn * finest_step(channel) / span.width();
       for (const double extreme : {span.lowest, span.highest}) {
         const auto count = static_cast<double>(std::ranges::count(channel.values, extreme));
         const double share = count / static_cast<double>(channel.values.size());
         if (share < std::max(kSaturatedShare, by_code) ||
-            (returning && returning->value == extreme) ||
             approaches_gradually(channel, extreme, span) || is_turn(r, channel, extreme))
           continue;
+        const auto returning = find_returning_value(channel, kSpikeShare * span.width());
+        if (returning && returning->value == extreme) continue;
         add(Verdict::warn, "saturation", recording.name(),
             fmt::format("{}: {:.1f} % of the samples are exactly {:g}", channel.name, 100.0 * share,
                         extreme),
@@ -332,8 +332,7 @@ void Checker::check_jump_of_input(std::size_t r) {
       jump_text(recording, spec_.inputs.front(), jump) +
           fmt::format("; it comes from {}", source_of(recording, jump)),
       "Check whether that sensor slipped or lost counts or samples, or a part broke. Cut the "
-      "recording in two "
-      "there, and determine the zero of each part.",
+      "recording in two there, and determine the zero of each part.",
       {{jump.sample, jump.sample + 1}});
 }
 

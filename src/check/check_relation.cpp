@@ -23,32 +23,6 @@ bool is_motion_or_load(std::string_view channel) {
   return parts && std::ranges::find(kUnits, parts->unit->si_suffix) != kUnits.end();
 }
 
-bool is_angle(std::string_view channel) {
-  const auto parts = split_channel_name(channel);
-  return parts && parts->unit->si_suffix == "rad";
-}
-
-/// Whether the name is that of the output side of a gear.
-bool is_on_output_side(std::string_view channel) {
-  return std::ranges::any_of(
-      std::to_array<std::string_view>({"joint", "link", "load", "output"}),
-      [&](std::string_view word) { return channel.find(word) != std::string_view::npos; });
-}
-
-/// What to do where one of two angles moves `ratio` times as far as the other one, by a gear.
-std::string gear_advice(const std::string& further, const std::string& other, double ratio) {
-  if (is_on_output_side(further) && !is_on_output_side(other))
-    return fmt::format(
-        "That is the ratio of a gear, by which {0} was divided once too often: remove gear_ratio: "
-        "from its rule in the mapping, or if the drive divides by it twice, multiply:  channels: "
-        "{{{0}: {{from: ..., scale: {1:.3g}}}}}",
-        other, ratio);
-  return fmt::format(
-      "That is as far as before a gear of about {1:.3g}: write its ratio in a mapping, with the "
-      "column of {0}:  channels: {{{0}: {{from: ..., gear_ratio: {1:.3g}}}}}",
-      further, ratio);
-}
-
 }  // namespace
 
 FeatureSpec Checker::spec_of(std::size_t input) const {
@@ -83,110 +57,6 @@ void Checker::take_out_other_inputs() {
   if (!others.empty()) take_out(pairs_, others);
 }
 
-// The sensors of both sides of a spring turn by the same angle, so one of them in another unit
-// turns by a unit's factor as much; and recordings of one joint have one stiffness.
-void Checker::check_units() {
-  pass_unless_found("units", "the recordings agree", [&] {
-    for_each_record([&](std::size_t r) {
-      check_units_within(r);
-      if (spoiled_[r] == 0 && !changes_[r] && !positions_[r]) check_scale(r);
-      if (spoiled_[r] == 0) check_twist(r);
-    });
-    compare_slopes();
-    for_each_record([&](std::size_t r) {
-      if (spoiled_[r] == 0) check_load(r);
-    });
-  });
-}
-
-void Checker::compare_slopes() {
-  if (pairs_.size() < 2) return;
-  std::vector<double> slopes(pairs_.size(), 0.0);
-  for_each_record([&](std::size_t r) {
-    if (is_clear(r)) slopes[r] = std::abs(line_through(pairs_[r]).slope);
-  });
-  const std::size_t usual = usual_slope(slopes);
-  const auto near_usual = std::ranges::count_if(slopes, [&](double slope) {
-    return slope > 0.0 && ratio_of(slope, slopes[usual]) < kSlopeRatio;
-  });
-  for (std::size_t r = 0; r < pairs_.size(); ++r)
-    if (slopes[r] > 0.0 && ratio_of(slopes[r], slopes[usual]) >= kSlopeRatio)
-      report_slope(r, slopes[r], usual, slopes[usual], near_usual > 1);
-}
-
-void Checker::report_slope(std::size_t r, double slope, std::size_t usual, double usual_slope,
-                           bool is_majority) {
-  const Recording& other = dataset_.records[usual].recording;
-  const double torque_ratio =
-      extent_of(pairs_[r].target).width() / extent_of(pairs_[usual].target).width();
-  const bool by_torque =
-      std::abs(std::log(torque_ratio)) > 0.5 * std::log(ratio_of(slope, usual_slope));
-  const std::string_view mistake =
-      unit_mistake(slope / usual_slope, !by_torque && is_angle(spec_.inputs.front()));
-  if (mistake.empty() && !other.conditions().empty()) return;  // the condition explains it
-  spoiled_[r] = 1;
-  const std::string& own = dataset_.records[r].recording.name();
-  add(mistake.empty() ? Verdict::warn : Verdict::fail, "units",
-      is_majority ? own : own + " or " + other.name(),
-      fmt::format("the slope of {} over {} is {:.4g} times {} in {} than in {}{}", dataset_.target,
-                  spec_.inputs.front(), ratio_of(slope, usual_slope),
-                  slope > usual_slope ? "larger" : "smaller", own,
-                  is_majority ? "the other recordings, as in " : "", other.name()),
-      mistake.empty()
-          ? "Check spring, units and gear ratio: recordings of one joint have one stiffness."
-          : fmt::format(
-                "That is the factor between {}: check the unit of {} in {}, and specify it in "
-                "the column's name or with unit: in a mapping.",
-                mistake, by_torque ? dataset_.target : spec_.inputs.front(),
-                is_majority ? "this recording"
-                            : "both recordings (two recordings do not show which is correct)"));
-}
-
-/// The recording whose slope most others have, too; the first of equals.
-std::size_t Checker::usual_slope(const std::vector<double>& slopes) {
-  const auto company = [&](double slope) {
-    return slope > 0.0
-               ? std::ranges::count_if(
-                     slopes,
-                     [&](double each) { return each > 0.0 && ratio_of(each, slope) < kSlopeRatio; })
-               : 0;
-  };
-  return static_cast<std::size_t>(std::ranges::max_element(slopes, {}, company) - slopes.begin());
-}
-
-double Checker::ratio_of(double a, double b) { return std::max(a / b, b / a); }
-
-bool Checker::is_clear(std::size_t r) const {
-  return spoiled_[r] == 0 &&
-         std::abs(correlation(pairs_[r].input, pairs_[r].target)) > kClearCorrelation;
-}
-
-void Checker::check_units_within(std::size_t r) {
-  const Recording& recording = dataset_.records[r].recording;
-  if (order_of_difference(r) == 0) return;
-  const Pair sides{recording.channel(sources_[0]).values, recording.channel(sources_[1]).values};
-  if (correlation(sides.input, sides.target) < kOneMotion) return;
-  const double slope = line_through(sides).slope;
-  const bool are_angles = is_angle(sources_[0]) && is_angle(sources_[1]);
-  const double ratio = std::max(slope, 1.0 / slope);
-  const std::string_view mistake = unit_mistake(slope, are_angles);
-  // With a locked gear the joint alone turns, and the torque follows.
-  const bool is_without_ratio =
-      are_angles && ratio >= kLowestGearRatio &&
-      std::abs(correlation(pairs_[r].input, pairs_[r].target)) < kTogether;
-  if (mistake.empty() && !is_without_ratio) return;
-  spoiled_[r] = 1;
-  const std::string& further = slope > 1.0 ? sources_[1] : sources_[0];
-  const std::string& other = slope > 1.0 ? sources_[0] : sources_[1];
-  add(Verdict::fail, "units", recording.name(),
-      fmt::format("{} moves {:.4g} times as far as {}", further, ratio, other),
-      mistake.empty()
-          ? gear_advice(further, other, sides_[r] ? ratio_of(1.0 + sides_[r]->excess, 1.0) : ratio)
-          : fmt::format("That is the factor between {}: specify the column's unit in its name or "
-                        "with unit: in a mapping.",
-                        mistake));
-}
-
 void Checker::check_sign_flips() {
   for_each_record([&](std::size_t r) {
     if (const Jump jump = largest_jump(pairs_[r].input); stands_out(jump, pairs_[r].input)) return;
@@ -207,9 +77,8 @@ void Checker::check_delay() {
   for_each_record([&](std::size_t r) {
     if (spoiled_[r] != 0 || changes_[r] || check_sides(r)) return;
     const auto delay = estimate_delay(pairs_[r], rate);
-    const auto course = delay ? find_lag_course(pairs_[r], rate, *delay) : std::nullopt;
-    if (course)
-      report_clocks(r, *course);
+    if (delay && delay->course)
+      report_clocks(r, *delay->course);
     else if (delay && (is_late(*delay, rate) || is_early(*delay, rate)))
       report_delay(r, *delay);
     else
@@ -245,13 +114,11 @@ bool Checker::check_sides(std::size_t r) {
 void Checker::report_clocks(std::size_t r, const LagCourse& course) {
   add(Verdict::warn, "delay", dataset_.records[r].recording.name(),
       fmt::format("{} comes later by {:.3g} ms in each second, by {:.0f} ms in all: two clocks of "
-                  "different "
-                  "speed",
+                  "different speed",
                   course.per_second > 0.0 ? dataset_.target : spec_.inputs.front(),
                   1e3 * std::abs(course.per_second), 1e3 * std::abs(course.change_s)),
       "Record both with one clock, or multiply the stamps of one of them before they are joined. A "
-      "constant "
-      "latency: does not remove it.");
+      "constant latency: does not remove it.");
 }
 
 void Checker::report_delay(std::size_t r, const Delay& delay) {

@@ -82,8 +82,7 @@ std::string coding_advice(const Recording& recording, const std::string& name,
                          zero);
   return fmt::format(
       "Mapping: channels: {{{}: {{from: ..., {}: {:.9g}}}}}, with the column of {} (the number is "
-      "in {}; give it in "
-      "the "
+      "in {}; give it in the "
       "unit of the column).{}",
       name, key_of(coded.kind), coded.span, name, unit_label(name), zero);
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "check/checker.hpp"
 #include "check/hysteresis_fit.hpp"
@@ -210,32 +209,6 @@ bool Checker::check_cut(std::size_t r) {
   return true;
 }
 
-/// The range without the outermost hundredth of the samples on either side.
-double Checker::inner_range(const std::vector<double>& values) {
-  std::vector<double> finite;
-  finite.reserve(values.size());
-  std::ranges::copy_if(values, std::back_inserter(finite), is_finite);
-  if (finite.empty()) return 0.0;
-  const auto outer = static_cast<std::ptrdiff_t>(kOuter * static_cast<double>(finite.size()));
-  const auto low = finite.begin() + outer;
-  const auto high = finite.end() - 1 - outer;
-  std::ranges::nth_element(finite, low);
-  const double lowest = *low;
-  std::ranges::nth_element(low, high, finite.end());
-  return *high - lowest;
-}
-
-// A torque in mNm in every recording: nothing in the recordings contradicts it.
-void Checker::check_load(std::size_t r) {
-  const auto parts = split_channel_name(dataset_.target);
-  if (!parts || parts->unit->si_suffix != "Nm") return;
-  const double range_Nm = inner_range(pairs_[r].target);
-  if (range_Nm < kHighestLoad_Nm) return;
-  add(Verdict::warn, "units", dataset_.records[r].recording.name(),
-      fmt::format("{} ranges through {:.3g} Nm", dataset_.target, range_Nm),
-      "Hardly any joint with a spring carries so much: check the unit of the torque.");
-}
-
 // The rows between two new samples of a slow sensor are counted by its own clock.
 void Checker::check_cadence(std::size_t r) {
   const Recording& recording = dataset_.records[r].recording;
@@ -250,45 +223,6 @@ void Checker::check_cadence(std::size_t r) {
         "there.");
     return;
   }
-}
-
-// A wrong unit of both angles, or a column that contains another quantity.
-void Checker::check_twist(std::size_t r) {
-  const auto parts = split_channel_name(sources_.front());
-  if (!parts || parts->unit->si_suffix != "rad") return;
-  if (order_of_difference(r) == 0 && spec_.inputs.front() != "spring_deflection_rad") return;
-  const double width = inner_range(pairs_[r].input);
-  if (width < kWidestTwist_rad) return;
-  spoiled_[r] = 1;
-  add(Verdict::warn, "units", dataset_.records[r].recording.name(),
-      fmt::format("{} ranges through {:.3g} rad, {:.2g} turns", spec_.inputs.front(), width,
-                  width / (2.0 * std::numbers::pi)),
-      "No spring of a joint twists so far: check the unit of the angles, their gear ratio, a wrap "
-      "by one turn, and whether two columns were interchanged.");
-}
-
-// The sensors of both sides of a spring turn by the same angle, apart from the deflection.
-void Checker::check_scale(std::size_t r) {
-  const auto& sides = sides_[r];
-  if (!sides || !has_wrong_scale(*sides)) return;
-  // No pair of gears has such a ratio, and an encoder hardly such a scale.
-  if (std::abs(sides->excess) < kScaleOfAGear) {
-    add(Verdict::warn, "position", dataset_.records[r].recording.name(),
-        fmt::format(
-            "apart from the deflection, {} depends on the angle of the joint as if {} moved {:.4g} "
-            "times as far as {}",
-            dataset_.target, sources_[0], 1.0 + sides->excess, sources_[1]),
-        "The weight of a link that bends the sensor looks like this, and so does a scale that is "
-        "wrong "
-        "by that share: turn the unloaded joint and compare the two angles.");
-    return;
-  }
-  spoiled_[r] = 1;
-  add(Verdict::fail, "units", dataset_.records[r].recording.name(),
-      fmt::format("{} moves {:.4g} times as far as {}, apart from the deflection that {} explains",
-                  sources_[0], 1.0 + sides->excess, sources_[1], dataset_.target),
-      "Both sides of a spring turn by the same angle: check the gear ratio and the scale of the "
-      "columns (scale: in a mapping).");
 }
 
 }  // namespace torsio

@@ -1,6 +1,9 @@
 // Torques that are not those of the joint: without a sign, at the limit of an amplifier, bent by the weight of a link.
 #include <fmt/format.h>
 
+#include <cmath>
+#include <string>
+
 #include "check/checker.hpp"
 #include "check/signal_faults.hpp"
 #include "check/torque_faults.hpp"
@@ -40,26 +43,38 @@ void Checker::check_limit(std::size_t r) {
           dataset_.target, limit->visits, limit->level, unit_label(dataset_.target),
           spec_.inputs.front(), limit->hidden, unit_label(dataset_.target)),
       "If that is the limit of the sensor or its amplifier, cut those parts out or use a larger "
-      "range; "
-      "a clutch that slips has such a limit, too.",
+      "range; a clutch that slips has such a limit, too.",
       std::move(places));
 }
 
 void Checker::check_position() {
   pass_unless_found("position", "the torque does not depend on the angle of the joint", [&] {
     for_each_record([&](std::size_t r) {
-      const auto& effect = positions_[r];
-      if (spoiled_[r] != 0 || !effect) return;
-      add(Verdict::warn, "position", dataset_.records[r].recording.name(),
-          fmt::format("{} depends on {} by {:.3g} {} at equal {} ({:.2g} % unexplained without it, "
-                      "{:.2g} % with it)",
-                      dataset_.target, kJointAngle, effect->amplitude, unit_label(dataset_.target),
-                      spec_.inputs.front(), 100.0 * effect->unexplained,
-                      100.0 * effect->unexplained * effect->left),
-          "The weight of a link bends the sensor, or an encoder has an error once per turn: mount "
-          "the "
-          "sensor without bending loads, calibrate the encoder, or record the error and subtract "
-          "it.");
+      if (spoiled_[r] != 0) return;
+      const std::string& recording = dataset_.records[r].recording.name();
+      if (const auto& effect = positions_[r]) {
+        add(Verdict::warn, "position", recording,
+            fmt::format(
+                "{} depends on {} by {:.3g} {} at equal {} ({:.2g} % unexplained without it, "
+                "{:.2g} % with it)",
+                dataset_.target, kJointAngle, effect->amplitude, unit_label(dataset_.target),
+                spec_.inputs.front(), 100.0 * effect->unexplained,
+                100.0 * effect->unexplained * effect->left),
+            "The weight of a link bends the sensor, or an encoder has an error once per turn: "
+            "mount "
+            "the sensor without bending loads, calibrate the encoder, or record the error and "
+            "subtract it.");
+      } else if (const auto& sides = sides_[r]; sides && !changes_[r] && has_wrong_scale(*sides) &&
+                                                std::abs(sides->excess) < kScaleOfAGear) {
+        // Over a part of a turn a sine is nearly a line.
+        add(Verdict::warn, "position", recording,
+            fmt::format("apart from the deflection, {} depends on the angle of the joint as if {} "
+                        "moved {:.4g} times as far as {}",
+                        dataset_.target, sources_[0], 1.0 + sides->excess, sources_[1]),
+            "The weight of a link that bends the sensor looks like this, and so does a scale that "
+            "is "
+            "wrong by that share: turn the unloaded joint and compare the two angles.");
+      }
     });
   });
 }

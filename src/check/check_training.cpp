@@ -36,8 +36,7 @@ bool Checker::check_determination(const TrainingData& data) {
   if (!(held_out.rmse > kDetermined * held_out.constant_rmse)) return true;
   add(Verdict::fail, "training data", "",
       fmt::format("the inputs do not determine {}: a curve fitted to two thirds of each recording "
-                  "has an RMSE "
-                  "of {:.3g} {} in the rest, a constant {:.3g}",
+                  "has an RMSE of {:.3g} {} in the rest, a constant {:.3g}",
                   data.target, held_out.rmse, unit_label(data.target), held_out.constant_rmse),
       "Check that inputs and target are of the same joint and time, and that the torque sensor "
       "measures.");
@@ -71,9 +70,8 @@ void Checker::check_explanation() {
       fmt::format(
           "a curve with hysteresis over {}, and the other inputs, leave {:.0f} % of {} unexplained",
           spec_.inputs.front(), 100.0 * left / squares, dataset_.target),
-      "Plot both: something else than the torque of this joint is in the log, or an "
-      "input is missing that "
-      "it depends on.");
+      "Plot both: something else than the torque of this joint is in the log, or an input is "
+      "missing that it depends on.");
 }
 
 // The rules of `fit` are applied, not repeated: what it refuses is a FAIL with its own message.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "check/hysteresis_fit.hpp"
@@ -188,44 +189,16 @@ class Search {
     return longest_ > 0 && samples_.size() >= kFewestSamples;
   }
 
-  /// A lag a + b t by Gauss and Newton: the target and t times the target change by their derivatives. Begins at a
-  /// constant lag.
-  [[nodiscard]] LagCourse run_course(double lag_s) {
-    prepare();
-    const Eigen::Index rows = columns_.rows();
-    Eigen::MatrixXd columns(rows, kColumns + 2);
-    columns.rightCols(kColumns) = columns_;
-    std::vector<std::uint8_t> is_free(static_cast<std::size_t>(kColumns + 2), 0);
-    std::fill_n(is_free.begin(), 2 + kFree, std::uint8_t{1});
-    const Eigen::VectorXd at_s = times_s();
-    LagCourse course{.at_middle_s = lag_s};
-    for (int step = 0; step < kCourseSteps; ++step) {
-      Eigen::VectorXd target(rows);
-      for (Eigen::Index n = 0; n < rows; ++n) {
-        const double late_s = course.at_middle_s + course.per_second * at_s(n);
-        const auto [value, rate] = target_at(n, late_s);
-        target(n) = value, columns(n, 0) = rate, columns(n, 1) = rate * at_s(n);
-      }
-      target.array() -= target.mean();
-      if (line_.dot(target) < 0.0) target = -target, columns.leftCols<2>() *= -1.0;
-      NormalEquations equations(static_cast<std::size_t>(kColumns + 2));
-      const Eigen::MatrixXd product = columns.transpose() * columns;
-      const Eigen::VectorXd projection = columns.transpose() * target;
-      equations.product.values.assign(product.data(), product.data() + product.size());
-      equations.projection.assign(projection.begin(), projection.end());
-      equations.square = target.squaredNorm();
-      const std::vector<double> found = non_negative_least_squares(equations, is_free).coefficients;
-      course.unexplained = equations.error(found) / equations.square;
-      course.at_middle_s -= found[0];
-      course.per_second -= found[1];
-    }
-    course.change_s = course.per_second * (at_s(rows - 1) - at_s(0));
-    return course;
-  }
-
   [[nodiscard]] Delay run() {
-    prepare();
-    const auto step = coarse_step();
+    columns_ = spring_columns(pair_.input, samples_, sample_rate_Hz_);
+    line_ = columns_.col(1).array() - columns_.col(1).mean();
+    for (std::size_t p = 0; p < kParts; ++p) {
+      const Eigen::Index begin = part_begin(p);
+      const auto rows = columns_.middleRows(begin, part_begin(p + 1) - begin);
+      products_[p] = rows.transpose() * rows;
+    }
+    const auto step = std::max<std::ptrdiff_t>(
+        1, static_cast<std::ptrdiff_t>(std::round(kCoarseStep_s * sample_rate_Hz_)));
     std::vector<std::pair<std::ptrdiff_t, double>> shares;
     for (std::ptrdiff_t lag = -(longest_ / step) * step; lag <= longest_; lag += step)
       shares.emplace_back(lag, fit(lag).unexplained());
@@ -258,14 +231,59 @@ class Search {
       if (const double late_s = static_cast<double>(best.first - lag) / sample_rate_Hz_;
           late_s > 0.0 && greatest_share(late_s) * share >= best.second)
         delay.shortest_s = late_s;
+    delay.course = run_course(delay);
     return delay;
   }
 
  private:
-  [[nodiscard]] std::ptrdiff_t coarse_step() const {
-    return std::max<std::ptrdiff_t>(
-        1, static_cast<std::ptrdiff_t>(std::round(kCoarseStep_s * sample_rate_Hz_)));
+  /// Empty unless the lag clearly grows.
+  [[nodiscard]] std::optional<LagCourse> run_course(const Delay& constant) const {
+    const LagCourse course = fit_course(constant.lag_s);
+    const bool is_clear = std::abs(course.change_s) >= kLeastChange_s &&
+                          std::abs(course.change_s) <= kLongest_s &&
+                          course.unexplained <= kCourseShare * constant.unexplained;
+    return is_clear ? std::optional(course) : std::nullopt;
   }
+
+  /// A lag a + b t by Gauss and Newton: the target and t times the target change by their derivatives. Begins at a
+  /// constant lag.
+  [[nodiscard]] LagCourse fit_course(double lag_s) const {
+    const Eigen::Index rows = columns_.rows();
+    Eigen::MatrixXd columns(rows, kColumns + 2);
+    columns.rightCols(kColumns) = columns_;
+    std::vector<std::uint8_t> is_free(static_cast<std::size_t>(kColumns + 2), 0);
+    std::fill_n(is_free.begin(), 2 + kFree, std::uint8_t{1});
+    const Eigen::VectorXd at_s = times_s();
+    LagCourse course{.at_middle_s = lag_s};
+    Eigen::MatrixXd product(kColumns + 2, kColumns + 2);
+    product.bottomRightCorner(kColumns, kColumns) =
+        std::accumulate(products_.begin() + 1, products_.end(), products_.front());
+    for (int step = 0; step < kCourseSteps; ++step) {
+      if (!std::isfinite(course.at_middle_s) || !std::isfinite(course.per_second)) return {};
+      Eigen::VectorXd target(rows);
+      for (Eigen::Index n = 0; n < rows; ++n) {
+        const double late_s = course.at_middle_s + course.per_second * at_s(n);
+        const auto [value, rate] = target_at(n, late_s);
+        target(n) = value, columns(n, 0) = rate, columns(n, 1) = rate * at_s(n);
+      }
+      target.array() -= target.mean();
+      if (line_.dot(target) < 0.0) target = -target, columns.leftCols<2>() *= -1.0;
+      NormalEquations equations(static_cast<std::size_t>(kColumns + 2));
+      product.topRows<2>() = columns.leftCols<2>().transpose() * columns;
+      product.leftCols<2>() = product.topRows<2>().transpose().eval();
+      const Eigen::VectorXd projection = columns.transpose() * target;
+      equations.product.values.assign(product.data(), product.data() + product.size());
+      equations.projection.assign(projection.begin(), projection.end());
+      equations.square = target.squaredNorm();
+      const std::vector<double> found = non_negative_least_squares(equations, is_free).coefficients;
+      course.unexplained = equations.error(found) / equations.square;
+      course.at_middle_s -= found[0];
+      course.per_second -= found[1];
+    }
+    course.change_s = course.per_second * (at_s(rows - 1) - at_s(0));
+    return course;
+  }
+
   /// Times of the samples, from the middle one.
   [[nodiscard]] Eigen::VectorXd times_s() const {
     Eigen::VectorXd at_s(columns_.rows());
@@ -283,15 +301,6 @@ class Search {
     const auto before = static_cast<std::size_t>(std::floor(at));
     const double step = pair_.target[before + 1] - pair_.target[before];
     return {pair_.target[before] + (at - std::floor(at)) * step, step * sample_rate_Hz_};
-  }
-  void prepare() {
-    columns_ = spring_columns(pair_.input, samples_, sample_rate_Hz_);
-    line_ = columns_.col(1).array() - columns_.col(1).mean();
-    for (std::size_t p = 0; p < kParts; ++p) {
-      const Eigen::Index begin = part_begin(p);
-      const auto rows = columns_.middleRows(begin, part_begin(p + 1) - begin);
-      products_[p] = rows.transpose() * rows;
-    }
   }
   [[nodiscard]] Eigen::Index part_begin(std::size_t p) const {
     return columns_.rows() * static_cast<Eigen::Index>(p) / static_cast<Eigen::Index>(kParts);
@@ -318,17 +327,6 @@ std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz) {
   Search search(pair, sample_rate_Hz);
   if (!search.is_possible()) return {};
   return search.run();
-}
-
-std::optional<LagCourse> find_lag_course(const Pair& pair, double sample_rate_Hz,
-                                         const Delay& constant) {
-  Search search(pair, sample_rate_Hz);
-  if (!search.is_possible()) return {};
-  const LagCourse course = search.run_course(constant.lag_s);
-  const bool is_clear = std::abs(course.change_s) >= kLeastChange_s &&
-                        std::abs(course.change_s) <= kLongest_s &&
-                        course.unexplained <= kCourseShare * constant.unexplained;
-  return is_clear ? std::optional(course) : std::nullopt;
 }
 
 bool is_late(const Delay& delay, double sample_rate_Hz) {

@@ -7,6 +7,14 @@
 
 namespace torsio {
 
+/// A lag that grows in time, as between two clocks.
+struct LagCourse {
+  double at_middle_s = 0.0;  ///< in the middle of the recording
+  double per_second = 0.0;
+  double change_s = 0.0;  ///< over the whole recording
+  double unexplained = 1.0;
+};
+
 /// The shift of the target at which a dissipative spring over the input explains it best:
 ///
 ///     target(t + lag) = f(z) + a t + sum c_k s_k(z) + sum d_k |z| s_k(z) + sum e_l (z - low-pass_l(z))
@@ -28,21 +36,12 @@ struct Delay {
   /// after it. Infinite if none would.
   double shortest_s = 0.0;
   bool is_at_end = false;  ///< the search ends at this lag
+  /// Two clocks; empty unless it changes by at least 12 ms, and leaves at most 30 % of what a constant lag leaves.
+  std::optional<LagCourse> course = {};
 };
 
 /// Lags up to 0.6 s are searched. Empty if there are too few samples.
 [[nodiscard]] std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz);
-
-/// A lag that grows in time, as between two clocks.
-struct LagCourse {
-  double at_middle_s = 0.0;  ///< in the middle of the recording
-  double per_second = 0.0;
-  double change_s = 0.0;  ///< over the whole recording
-  double unexplained = 1.0;
-};
-/// Empty unless it changes by at least 12 ms, and leaves at most 30 % of what a constant lag leaves.
-[[nodiscard]] std::optional<LagCourse> find_lag_course(const Pair& pair, double sample_rate_Hz,
-                                                       const Delay& constant);
 
 /// Whether a shift explains a good part of what is unexplained without it, also in parts of the
 /// recording that were not used for the fit. Late: at least 8 ms; the shift explains 30 % of it, of a long delay 75 %. Early: the

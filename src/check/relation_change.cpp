@@ -46,13 +46,13 @@ Eigen::MatrixXd with_loaded_stops(const Eigen::MatrixXd& columns) {
 
 /// Whether input and target pass through a good part of their ranges in [begin, end), and the input
 /// reverses there.
-bool is_excited(const Pair& pair, Eigen::Index begin, Eigen::Index end) {
+bool is_excited(const Pair& pair, const std::pair<Extent, Extent>& all, Eigen::Index begin,
+                Eigen::Index end) {
   const auto first = static_cast<std::size_t>(begin);
   const auto last = static_cast<std::size_t>(end);
-  const auto [all_input, all_target] = known_extents(pair);
   const auto [input, target] = known_extents(pair, first, last);
-  return input.width() > kPartShare * all_input.width() &&
-         target.width() > kPartShare * all_target.width() &&
+  return input.width() > kPartShare * all.first.width() &&
+         target.width() > kPartShare * all.second.width() &&
          count_reversals(std::span(pair.input).subspan(first, last - first), 1) > 0;
 }
 
@@ -172,9 +172,10 @@ Candidate best_candidate(const Course& course, const Eigen::MatrixXd& columns,
   if (is_moving(columns))
     for (const double settling : kSettlings) take(1.0 - (-trend.array() / settling).exp(), {});
   const Pair moved{{columns.col(1).begin(), columns.col(1).end()}, {target.begin(), target.end()}};
+  const std::pair<Extent, Extent> all = known_extents(moved);
   for (std::size_t k = 1; k < kCandidates; ++k) {
     const auto split = size * static_cast<Eigen::Index>(k) / static_cast<Eigen::Index>(kCandidates);
-    if (!is_excited(moved, 0, split) || !is_excited(moved, split, size)) continue;
+    if (!is_excited(moved, all, 0, split) || !is_excited(moved, all, split, size)) continue;
     Eigen::VectorXd step = Eigen::VectorXd::Ones(size);
     step.head(split).setZero();
     take(step, split);

@@ -64,19 +64,18 @@ Left left_by(const Eigen::MatrixXd& columns, const Eigen::VectorXd& rest) {
 
 /// Visits of a zone at one end of the target, during which the input continues outwards.
 /// @param sign 1: the highest values, -1: the lowest ones
-Limit limit_at(const Pair& pair, double sign, double zone, double slope, double least_hidden) {
-  Extent range;
-  for (std::size_t i = 0; i < pair.target.size(); ++i)
-    if (is_known(pair, i)) range.include(sign * pair.target[i]);
+Limit limit_at(const Pair& pair, const Extent& target, double sign, double zone, double slope,
+               double least_hidden) {
+  const double end_of_range = sign > 0.0 ? target.highest : -target.lowest;
   Limit limit;
-  limit.level = sign * (range.highest - 0.5 * zone);
+  limit.level = sign * (end_of_range - 0.5 * zone);
   bool has_left = true;  // a visit that noise divides is one
   const auto is_inside = [&](std::size_t i) {
-    return is_known(pair, i) && sign * pair.target[i] >= range.highest - zone;
+    return is_known(pair, i) && sign * pair.target[i] >= end_of_range - zone;
   };
   for (std::size_t begin = 0, end = 0; begin < pair.target.size(); begin = end) {
     end = begin + 1;
-    if (is_known(pair, begin) && sign * pair.target[begin] < range.highest - kAway * range.width())
+    if (is_known(pair, begin) && sign * pair.target[begin] < end_of_range - kAway * target.width())
       has_left = true;
     if (!is_inside(begin)) continue;
     while (end < pair.target.size() && is_inside(end)) ++end;
@@ -133,7 +132,7 @@ std::optional<Limit> find_limit(const Pair& pair, double noise) {
   Limit best;
   std::size_t visits = 0;
   for (const double sign : {1.0, -1.0}) {
-    Limit limit = limit_at(pair, sign, zone, slope, hidden);
+    Limit limit = limit_at(pair, target, sign, zone, slope, hidden);
     visits += limit.visits;
     if (limit.visits > best.visits) best = std::move(limit);
   }
