@@ -4,7 +4,7 @@
 
 #include "data/clock_stamps.hpp"
 
-// Stamps that are not in order: what made them so is found, and refused with the line of a mapping that mends it.
+// Stamps that are not in order: what made them so is found, and refused with the line of a mapping that corrects it.
 namespace torsio {
 
 /// @throws ClockError for rows of several joints, one after the other: a channel differs more between two rows of a stamp
