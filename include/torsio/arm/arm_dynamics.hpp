@@ -86,11 +86,15 @@ class ArmDynamics {
     std::array<double, 6> inertia_kg_m2 = {};  ///< about the origin of the frame
   };
   struct Turned;
+  static void set_body(Link& link, const BodyInertia& body) noexcept;
   void place(std::span<const double> angle_rad, Turned& at) const noexcept;
-  void newton_euler(const Turned& at, std::span<const double> speed_rad_s,
-                    std::span<const double> acceleration_rad_s2, const Vector3& gravity_m_s2,
-                    std::span<double> torque_Nm) const noexcept;
-  void composite(const Turned& at, std::span<double> mass_kg_m2) const noexcept;
+  /// Without its terms of motion, of acceleration, or of both.
+  template <bool kMoves, bool kAccelerates>
+  void newton_euler(const Turned& at, const double* speed_rad_s, const double* acceleration_rad_s2,
+                    double* torque_Nm) const noexcept;
+  void composite(const Turned& at, double* mass_kg_m2) const noexcept;
+  [[nodiscard]] ArmFrame outwards(std::size_t joint,
+                                  std::span<const double> angle_rad) const noexcept;
   void load_last() noexcept;
 
   std::size_t count_ = 0;
@@ -104,7 +108,7 @@ class ArmDynamics {
 };
 
 /// Solves A x = b for a symmetric positive definite A of n x n by the Cholesky factorisation, in place of both.
-/// @returns false, and nothing is usable, if A is not positive definite
+/// @returns false, and x is NaN, if A is not positive definite
 bool solve_positive(std::span<double> matrix, std::span<double> x) noexcept TORSIO_REALTIME;
 
 }  // namespace torsio

@@ -61,6 +61,9 @@ struct ArmModel {
 /// @returns gravity in the frame of a base that is turned by this angle about its own y axis
 [[nodiscard]] Vector3 tilted_gravity(double tilt_rad) noexcept;
 
+/// Whether its mass is 0 or more, its inertia not negative, and every value finite.
+[[nodiscard]] bool is_possible_payload(const BodyInertia& payload) noexcept;
+
 /// @throws Error that names the joint if an arm has none or more than `kMaxArmJoints`, two joints of one name, an axis
 /// that is not of length 1, a rotation that is none, a value that is not finite, a mass that is not positive, an inertia
 /// that no body has (positive definite, and the sum of two principal moments not below the third), limits that contain no
