@@ -203,6 +203,39 @@ void ArmDynamics::forward(std::span<const double> angle_rad, std::span<const dou
   solve_positive(std::span(mass_kg_m2).first(count_ * count_), acceleration_rad_s2.first(count_));
 }
 
+void ArmDynamics::momentum(std::span<const double> angle_rad, std::span<const double> speed_rad_s,
+                           std::span<double> momentum_Nms,
+                           std::span<double> energy_gradient_Nm) const noexcept {
+  Turned at;
+  place(angle_rad, at);
+  std::array<Vector3, kMaxArmJoints> spin;
+  std::array<Vector3, kMaxArmJoints> velocity;
+  std::array<Vector3, kMaxArmJoints> linear;
+  std::array<Vector3, kMaxArmJoints> angular;
+  Vector3 w{};
+  Vector3 v{};
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Link& link = links_[i];
+    v = rotated_back(at.rotation[i], v + cross(w, link.origin.position_m));
+    w = rotated_back(at.rotation[i], w);
+    w[2] += speed_rad_s[i];
+    spin[i] = w;
+    velocity[i] = v;
+    linear[i] = link.body.mass_kg * v + cross(w, link.moment_kg_m);
+    angular[i] = times(link.inertia_kg_m2, w) + cross(link.moment_kg_m, v);
+  }
+  for (std::size_t i = count_; i-- > 0;) {
+    momentum_Nms[i] = angular[i][2];
+    energy_gradient_Nm[i] = spin[i][1] * angular[i][0] - spin[i][0] * angular[i][1] +
+                            velocity[i][1] * linear[i][0] - velocity[i][0] * linear[i][1];
+    if (i == 0) break;
+    const Vector3 p = rotated(at.rotation[i], linear[i]);
+    linear[i - 1] = linear[i - 1] + p;
+    angular[i - 1] = angular[i - 1] + rotated(at.rotation[i], angular[i]) +
+                     cross(links_[i].origin.position_m, p);
+  }
+}
+
 ArmFrame ArmDynamics::outwards(std::size_t joint,
                                std::span<const double> angle_rad) const noexcept {
   ArmFrame frame;
@@ -265,34 +298,41 @@ double ArmDynamics::potential_energy(std::span<const double> angle_rad) const no
   return energy_J;
 }
 
-// A = L D Lᵀ: without square roots; the diagonal keeps 1/D.
-bool solve_positive(std::span<double> matrix, std::span<double> x) noexcept {
-  const std::size_t n = x.size();
+// Without square roots, whose latency would be a third of the time.
+bool factor_positive(std::span<double> matrix, std::size_t n) noexcept {
   double* const a = matrix.data();
   for (std::size_t i = 0; i < n; ++i) {
     double pivot = a[i * n + i];
-    for (std::size_t j = 0; j < i; ++j) {
-      double sum = a[i * n + j];  // L D
-      for (std::size_t k = 0; k < j; ++k) sum -= a[i * n + k] * a[j * n + k];
-      a[i * n + j] = sum;
-    }
+    for (std::size_t j = 0; j < i; ++j)  // first L D
+      for (std::size_t k = 0; k < j; ++k) a[i * n + j] -= a[i * n + k] * a[j * n + k];
     for (std::size_t j = 0; j < i; ++j) {
       const double l = a[i * n + j] * a[j * n + j];
       pivot -= l * a[i * n + j];
       a[i * n + j] = l;
-      x[i] -= l * x[j];
     }
     if (!(pivot > 0.0)) {
-      std::ranges::fill(x, std::numeric_limits<double>::quiet_NaN());
+      std::ranges::fill(matrix, std::numeric_limits<double>::quiet_NaN());
       return false;
     }
     a[i * n + i] = 1.0 / pivot;
   }
-  for (std::size_t i = n; i-- > 0;) {
-    x[i] *= a[i * n + i];
-    for (std::size_t k = i + 1; k < n; ++k) x[i] -= a[k * n + i] * x[k];
-  }
   return true;
+}
+
+void solve_factored(std::span<const double> factor, std::span<double> x) noexcept {
+  const std::size_t n = x.size();
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = 0; k < i; ++k) x[i] -= factor[i * n + k] * x[k];
+  for (std::size_t i = n; i-- > 0;) {
+    x[i] *= factor[i * n + i];
+    for (std::size_t k = i + 1; k < n; ++k) x[i] -= factor[k * n + i] * x[k];
+  }
+}
+
+bool solve_positive(std::span<double> matrix, std::span<double> x) noexcept {
+  const bool is_positive = factor_positive(matrix, x.size());
+  solve_factored(matrix, x);
+  return is_positive;
 }
 
 }  // namespace torsio

@@ -23,12 +23,10 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr std::size_t kJoints = 6;
-using Joints = std::array<double, kJoints>;
-using Square = std::array<double, kJoints * kJoints>;
+using Square = std::array<double, test::kArm6Joints * test::kArm6Joints>;
 
-Joints random_joints(Random& random, double width) {
-  Joints values;
+test::Arm6Joints random_joints(Random& random, double width) {
+  test::Arm6Joints values;
   for (double& value : values) value = width * (2.0 * random.uniform() - 1.0);
   return values;
 }
@@ -54,19 +52,19 @@ ArmModel skewed_arm() {
 
 /// The mass matrix of the definition, sum over the bodies of m Jᵀ J + Jᵀ I J, by finite differences of
 /// the frames.
-Square mass_by_definition(const ArmModel& arm, const Joints& angle_rad) {
+Square mass_by_definition(const ArmModel& arm, const test::Arm6Joints& angle_rad) {
   const ArmDynamics dynamics(arm);
   Square mass{};
   constexpr double kStep = 1e-6;
-  for (std::size_t body = 0; body < kJoints; ++body) {
+  for (std::size_t body = 0; body < test::kArm6Joints; ++body) {
     BodyInertia inertia = arm.joints[body].body;
-    if (body + 1 == kJoints) inertia = together(inertia, moved(arm.payload, arm.flange));
-    std::array<Vector3, kJoints> velocity{};
-    std::array<Vector3, kJoints> spin{};
+    if (body + 1 == test::kArm6Joints) inertia = together(inertia, moved(arm.payload, arm.flange));
+    std::array<Vector3, test::kArm6Joints> velocity{};
+    std::array<Vector3, test::kArm6Joints> spin{};
     const ArmFrame here = dynamics.link(body, angle_rad);
     for (std::size_t j = 0; j <= body; ++j) {
-      Joints more = angle_rad;
-      Joints less = angle_rad;
+      test::Arm6Joints more = angle_rad;
+      test::Arm6Joints less = angle_rad;
       more[j] += kStep;
       less[j] -= kStep;
       const ArmFrame after = dynamics.link(body, more);
@@ -83,9 +81,9 @@ Square mass_by_definition(const ArmModel& arm, const Joints& angle_rad) {
       spin[j] = {turn[7], turn[2], turn[3]};
     }
     const auto in_base = rotated(here.rotation, inertia.inertia_kg_m2);
-    for (std::size_t i = 0; i < kJoints; ++i)
-      for (std::size_t j = 0; j < kJoints; ++j)
-        mass[i * kJoints + j] +=
+    for (std::size_t i = 0; i < test::kArm6Joints; ++i)
+      for (std::size_t j = 0; j < test::kArm6Joints; ++j)
+        mass[i * test::kArm6Joints + j] +=
             inertia.mass_kg * dot(velocity[i], velocity[j]) + dot(spin[i], times(in_base, spin[j]));
   }
   return mass;
@@ -96,7 +94,7 @@ TEST(ArmDynamics, HasTheMassMatrixOfTheDefinition) {
     const ArmDynamics dynamics(arm);
     Random random(11);
     for (int i = 0; i < 20; ++i) {
-      const Joints angle_rad = random_joints(random, 3.0);
+      const test::Arm6Joints angle_rad = random_joints(random, 3.0);
       Square mass;
       dynamics.mass_matrix(angle_rad, mass);
       const Square expected = mass_by_definition(arm, angle_rad);
@@ -108,18 +106,18 @@ TEST(ArmDynamics, HasTheMassMatrixOfTheDefinition) {
 TEST(ArmDynamics, ItsInverseIsLinearInTheAccelerationsWithTheMassMatrix) {
   const ArmDynamics dynamics(skewed_arm());
   Random random(12);
-  const Joints angle_rad = random_joints(random, 3.0);
-  const Joints speed_rad_s = random_joints(random, 2.0);
+  const test::Arm6Joints angle_rad = random_joints(random, 3.0);
+  const test::Arm6Joints speed_rad_s = random_joints(random, 2.0);
   Square mass;
-  Joints bias_Nm;
+  test::Arm6Joints bias_Nm;
   dynamics.equation(angle_rad, speed_rad_s, mass, bias_Nm);
-  for (std::size_t j = 0; j < kJoints; ++j) {
-    Joints acceleration{};
+  for (std::size_t j = 0; j < test::kArm6Joints; ++j) {
+    test::Arm6Joints acceleration{};
     acceleration[j] = 1.0;
-    Joints torque_Nm;
+    test::Arm6Joints torque_Nm;
     dynamics.inverse(angle_rad, speed_rad_s, acceleration, torque_Nm);
-    for (std::size_t i = 0; i < kJoints; ++i)
-      EXPECT_NEAR(torque_Nm[i] - bias_Nm[i], mass[i * kJoints + j], 1e-12);
+    for (std::size_t i = 0; i < test::kArm6Joints; ++i)
+      EXPECT_NEAR(torque_Nm[i] - bias_Nm[i], mass[i * test::kArm6Joints + j], 1e-12);
   }
 }
 
@@ -129,33 +127,34 @@ TEST(ArmDynamics, ItsBiasFollowsFromTheEnergies) {
   Random random(13);
   constexpr double kStep = 1e-5;
   for (int trial = 0; trial < 10; ++trial) {
-    const Joints angle_rad = random_joints(random, 3.0);
-    const Joints speed_rad_s = random_joints(random, 2.0);
+    const test::Arm6Joints angle_rad = random_joints(random, 3.0);
+    const test::Arm6Joints speed_rad_s = random_joints(random, 2.0);
     Square mass;
-    Joints bias_Nm;
+    test::Arm6Joints bias_Nm;
     dynamics.equation(angle_rad, speed_rad_s, mass, bias_Nm);
-    const auto momentum = [&](const Joints& q) {
+    const auto momentum = [&](const test::Arm6Joints& q) {
       Square at;
       dynamics.mass_matrix(q, at);
-      Joints of{};
-      for (std::size_t i = 0; i < kJoints; ++i)
-        for (std::size_t j = 0; j < kJoints; ++j) of[i] += at[i * kJoints + j] * speed_rad_s[j];
+      test::Arm6Joints of{};
+      for (std::size_t i = 0; i < test::kArm6Joints; ++i)
+        for (std::size_t j = 0; j < test::kArm6Joints; ++j)
+          of[i] += at[i * test::kArm6Joints + j] * speed_rad_s[j];
       return of;
     };
-    Joints after_q = angle_rad;
-    Joints before_q = angle_rad;
-    for (std::size_t i = 0; i < kJoints; ++i) {
+    test::Arm6Joints after_q = angle_rad;
+    test::Arm6Joints before_q = angle_rad;
+    for (std::size_t i = 0; i < test::kArm6Joints; ++i) {
       after_q[i] += kStep * speed_rad_s[i];
       before_q[i] -= kStep * speed_rad_s[i];
     }
-    const Joints later = momentum(after_q);
-    const Joints earlier = momentum(before_q);
-    for (std::size_t i = 0; i < kJoints; ++i) {
-      Joints more = angle_rad;
-      Joints less = angle_rad;
+    const test::Arm6Joints later = momentum(after_q);
+    const test::Arm6Joints earlier = momentum(before_q);
+    for (std::size_t i = 0; i < test::kArm6Joints; ++i) {
+      test::Arm6Joints more = angle_rad;
+      test::Arm6Joints less = angle_rad;
       more[i] += kStep;
       less[i] -= kStep;
-      const auto lagrangian = [&](const Joints& q) {
+      const auto lagrangian = [&](const test::Arm6Joints& q) {
         return dynamics.kinetic_energy(q, speed_rad_s) - dynamics.potential_energy(q);
       };
       const double expected =
@@ -169,14 +168,15 @@ TEST(ArmDynamics, ForwardIsTheInverseOfInverse) {
   const ArmDynamics dynamics(skewed_arm());
   Random random(14);
   for (int i = 0; i < 100; ++i) {
-    const Joints angle_rad = random_joints(random, 3.0);
-    const Joints speed_rad_s = random_joints(random, 3.0);
-    const Joints wanted = random_joints(random, 20.0);
-    Joints torque_Nm;
-    Joints acceleration;
+    const test::Arm6Joints angle_rad = random_joints(random, 3.0);
+    const test::Arm6Joints speed_rad_s = random_joints(random, 3.0);
+    const test::Arm6Joints wanted = random_joints(random, 20.0);
+    test::Arm6Joints torque_Nm;
+    test::Arm6Joints acceleration;
     dynamics.inverse(angle_rad, speed_rad_s, wanted, torque_Nm);
     dynamics.forward(angle_rad, speed_rad_s, torque_Nm, acceleration);
-    for (std::size_t j = 0; j < kJoints; ++j) EXPECT_NEAR(acceleration[j], wanted[j], 1e-8);
+    for (std::size_t j = 0; j < test::kArm6Joints; ++j)
+      EXPECT_NEAR(acceleration[j], wanted[j], 1e-8);
   }
 }
 
@@ -184,15 +184,15 @@ TEST(ArmDynamics, ItsGravityTorqueIsThatOfTheTable) {
   ArmModel arm = test::arm6();
   arm.payload = test::payload_of_8_kg();
   const ArmDynamics dynamics(arm);
-  Joints torque_Nm;
-  dynamics.gravity_torque(Joints{}, torque_Nm);
+  test::Arm6Joints torque_Nm;
+  dynamics.gravity_torque(test::Arm6Joints{}, torque_Nm);
   // Stretched horizontally: g times the first moment of all that is beyond each joint.
   EXPECT_NEAR(torque_Nm[0], 0.0, 1e-12);
   EXPECT_NEAR(-torque_Nm[1], 149.6, 0.3);
   EXPECT_NEAR(-torque_Nm[2], 65.7, 0.2);
   EXPECT_NEAR(-torque_Nm[4], 16.4, 0.1);
   Square mass;
-  dynamics.mass_matrix(Joints{}, mass);
+  dynamics.mass_matrix(test::Arm6Joints{}, mass);
   EXPECT_NEAR(mass[1], 0.0, 1e-12);  // vertical and horizontal axis
   EXPECT_NEAR(mass[0], 14.95, 0.03);
   EXPECT_NEAR(mass[7], 14.94, 0.03);
@@ -205,24 +205,54 @@ TEST(ArmDynamics, ATiltedBaseLoadsTheFirstJoint) {
   arm.payload = test::payload_of_8_kg();
   ArmDynamics dynamics(arm);
   EXPECT_TRUE(dynamics.set_gravity(tilted_gravity(std::numbers::pi / 6.0)));
-  Joints angle_rad{};
+  test::Arm6Joints angle_rad{};
   angle_rad[0] = std::numbers::pi / 2.0;
-  Joints torque_Nm;
+  test::Arm6Joints torque_Nm;
   dynamics.gravity_torque(angle_rad, torque_Nm);
   EXPECT_NEAR(std::abs(torque_Nm[0]), 75.0, 1.0);
+}
+
+TEST(ArmDynamics, ItsMomentumAndGradientAreThoseOfTheKineticEnergy) {
+  const ArmDynamics dynamics(skewed_arm());
+  Random random(17);
+  constexpr double kStep = 1e-5;
+  for (int trial = 0; trial < 10; ++trial) {
+    const test::Arm6Joints angle_rad = random_joints(random, 3.0);
+    const test::Arm6Joints speed_rad_s = random_joints(random, 2.0);
+    test::Arm6Joints momentum_Nms;
+    test::Arm6Joints gradient_Nm;
+    dynamics.momentum(angle_rad, speed_rad_s, momentum_Nms, gradient_Nm);
+    Square mass;
+    dynamics.mass_matrix(angle_rad, mass);
+    for (std::size_t i = 0; i < test::kArm6Joints; ++i) {
+      double expected = 0.0;
+      for (std::size_t j = 0; j < test::kArm6Joints; ++j)
+        expected += mass[i * test::kArm6Joints + j] * speed_rad_s[j];
+      EXPECT_NEAR(momentum_Nms[i], expected, 1e-12);
+      test::Arm6Joints more = angle_rad;
+      test::Arm6Joints less = angle_rad;
+      more[i] += kStep;
+      less[i] -= kStep;
+      EXPECT_NEAR(gradient_Nm[i],
+                  (dynamics.kinetic_energy(more, speed_rad_s) -
+                   dynamics.kinetic_energy(less, speed_rad_s)) /
+                      (2.0 * kStep),
+                  1e-8);
+    }
+  }
 }
 
 TEST(ArmDynamics, ItsJacobianIsTheDerivativeOfTheFlange) {
   const ArmDynamics dynamics(skewed_arm());
   Random random(15);
   constexpr double kStep = 1e-6;
-  const Joints angle_rad = random_joints(random, 3.0);
-  std::array<double, 6 * kJoints> jacobian;
+  const test::Arm6Joints angle_rad = random_joints(random, 3.0);
+  std::array<double, 6 * test::kArm6Joints> jacobian;
   dynamics.jacobian(angle_rad, jacobian);
   const ArmFrame here = dynamics.flange(angle_rad);
-  for (std::size_t j = 0; j < kJoints; ++j) {
-    Joints more = angle_rad;
-    Joints less = angle_rad;
+  for (std::size_t j = 0; j < test::kArm6Joints; ++j) {
+    test::Arm6Joints more = angle_rad;
+    test::Arm6Joints less = angle_rad;
     more[j] += kStep;
     less[j] -= kStep;
     const ArmFrame after = dynamics.flange(more);
@@ -233,9 +263,9 @@ TEST(ArmDynamics, ItsJacobianIsTheDerivativeOfTheFlange) {
     const Matrix3 turn = product(rate, transposed(here.rotation));
     const Vector3 spin = {turn[7], turn[2], turn[3]};
     for (std::size_t row = 0; row < 3; ++row) {
-      EXPECT_NEAR(jacobian[row * kJoints + j],
+      EXPECT_NEAR(jacobian[row * test::kArm6Joints + j],
                   (after.position_m[row] - before.position_m[row]) / (2.0 * kStep), 1e-8);
-      EXPECT_NEAR(jacobian[(3 + row) * kJoints + j], spin[row], 1e-8);
+      EXPECT_NEAR(jacobian[(3 + row) * test::kArm6Joints + j], spin[row], 1e-8);
     }
   }
 }
@@ -247,10 +277,10 @@ TEST(ArmDynamics, APayloadIsThatOfTheModel) {
   ArmDynamics dynamics(test::arm6());
   EXPECT_TRUE(dynamics.set_payload(loaded.payload));
   Random random(16);
-  const Joints angle_rad = random_joints(random, 3.0);
-  const Joints speed_rad_s = random_joints(random, 3.0);
-  Joints a;
-  Joints b;
+  const test::Arm6Joints angle_rad = random_joints(random, 3.0);
+  const test::Arm6Joints speed_rad_s = random_joints(random, 3.0);
+  test::Arm6Joints a;
+  test::Arm6Joints b;
   expected.inverse(angle_rad, speed_rad_s, speed_rad_s, a);
   dynamics.inverse(angle_rad, speed_rad_s, speed_rad_s, b);
   EXPECT_EQ(a, b);
@@ -267,10 +297,10 @@ TEST(ArmDynamics, APayloadIsThatOfTheModel) {
 
 TEST(ArmDynamics, WhatIsNotFiniteGivesNoFiniteAcceleration) {
   const ArmDynamics dynamics(test::arm6());
-  Joints angle_rad{};
+  test::Arm6Joints angle_rad{};
   angle_rad[2] = std::numeric_limits<double>::quiet_NaN();
-  Joints acceleration;
-  dynamics.forward(angle_rad, Joints{}, Joints{}, acceleration);
+  test::Arm6Joints acceleration;
+  dynamics.forward(angle_rad, test::Arm6Joints{}, test::Arm6Joints{}, acceleration);
   for (const double value : acceleration) EXPECT_FALSE(std::isfinite(value));
 }
 

@@ -21,9 +21,6 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kJoints = 6;
-using Joints = std::array<double, kJoints>;
-
 std::string text(const Vector3& of) { return fmt::format("{} {} {}", of[0], of[1], of[2]); }
 
 std::string inertial(const BodyInertia& body) {
@@ -72,22 +69,22 @@ TEST(MujocoOracle, InverseDynamicsAgreeInTenThousandStates) {
   double worst_Nm = 0.0;
   double worst_kg_m2 = 0.0;
   for (int state = 0; state < 10000; ++state) {
-    Joints angle_rad;
-    Joints speed_rad_s;
-    Joints acceleration_rad_s2;
-    for (std::size_t j = 0; j < kJoints; ++j) {
+    test::Arm6Joints angle_rad;
+    test::Arm6Joints speed_rad_s;
+    test::Arm6Joints acceleration_rad_s2;
+    for (std::size_t j = 0; j < test::kArm6Joints; ++j) {
       oracle.data->qpos[j] = angle_rad[j] = random.uniform(-2.8, 2.8);
       oracle.data->qvel[j] = speed_rad_s[j] = random.uniform(-3.0, 3.0);
       oracle.data->qacc[j] = acceleration_rad_s2[j] = random.uniform(-20.0, 20.0);
     }
     mj_inverse(oracle.model.get(), oracle.data.get());
-    Joints torque_Nm;
+    test::Arm6Joints torque_Nm;
     dynamics.inverse(angle_rad, speed_rad_s, acceleration_rad_s2, torque_Nm);
-    std::array<double, kJoints * kJoints> mass;
-    std::array<double, kJoints * kJoints> expected;
+    std::array<double, test::kArm6Joints * test::kArm6Joints> mass;
+    std::array<double, test::kArm6Joints * test::kArm6Joints> expected;
     dynamics.mass_matrix(angle_rad, mass);
     mj_fullM(oracle.model.get(), expected.data(), oracle.data->qM);
-    for (std::size_t j = 0; j < kJoints; ++j)
+    for (std::size_t j = 0; j < test::kArm6Joints; ++j)
       worst_Nm = std::max(worst_Nm, std::abs(torque_Nm[j] - oracle.data->qfrc_inverse[j]));
     for (std::size_t k = 0; k < mass.size(); ++k)
       worst_kg_m2 = std::max(worst_kg_m2, std::abs(mass[k] - expected[k]));

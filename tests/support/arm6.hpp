@@ -8,6 +8,9 @@
 
 namespace torsio::test {
 
+inline constexpr std::size_t kArm6Joints = 6;
+using Arm6Joints = std::array<double, kArm6Joints>;
+
 /// The arm of share/torsio/arm6.urdf: two joints of 300 Nm, one of 120 Nm, three of 28 Nm.
 inline ArmModel arm6() {
   struct Row {

@@ -61,6 +61,16 @@ class ArmDynamics {
                std::span<const double> torque_Nm,
                std::span<double> acceleration_rad_s2) const noexcept TORSIO_REALTIME;
 
+  /// The momentum p = M(q) q̇ [Nms] and the derivative of the kinetic energy ∂T/∂q [Nm], with which
+  ///
+  ///     ṗ = τ + J(q)ᵀ f + ∂T/∂q − g(q)
+  ///
+  /// T changes with q_i as the links beyond the joint turn against the motion before it:
+  /// ∂T/∂q_i = −(S_i × v_i) · h_i, v_i the spatial velocity of link i, h_i the momentum of all links from i on.
+  void momentum(std::span<const double> angle_rad, std::span<const double> speed_rad_s,
+                std::span<double> momentum_Nms,
+                std::span<double> energy_gradient_Nm) const noexcept TORSIO_REALTIME;
+
   /// @returns the frame of the flange in that of the base
   [[nodiscard]] ArmFrame flange(std::span<const double> angle_rad) const noexcept TORSIO_REALTIME;
   /// @returns the frame of a link in that of the base
@@ -107,8 +117,12 @@ class ArmDynamics {
   Vector3 gravity_m_s2_;
 };
 
-/// Solves A x = b for a symmetric positive definite A of n x n by the Cholesky factorisation, in place of both.
-/// @returns false, and x is NaN, if A is not positive definite
+/// Factorises a symmetric positive definite A of n x n in place: A = L D Lᵀ, L below the diagonal, 1/D on it.
+/// @returns false, and the matrix is NaN, if A is not positive definite
+bool factor_positive(std::span<double> matrix, std::size_t n) noexcept TORSIO_REALTIME;
+/// Solves A x = b in place of b, A from `factor_positive`.
+void solve_factored(std::span<const double> factor, std::span<double> x) noexcept TORSIO_REALTIME;
+/// Both; x is NaN if A is not positive definite.
 bool solve_positive(std::span<double> matrix, std::span<double> x) noexcept TORSIO_REALTIME;
 
 }  // namespace torsio

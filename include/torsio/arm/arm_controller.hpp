@@ -1,0 +1,219 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "torsio/arm/arm_dynamics.hpp"
+#include "torsio/arm/cartesian_impedance.hpp"
+#include "torsio/arm/momentum_observer.hpp"
+#include "torsio/control/joint_controller.hpp"
+#include "torsio/control/joint_stop.hpp"
+#include "torsio/control/model_inverse.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/estimate/monitored_torque.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
+#include "torsio/signal/differentiator.hpp"
+
+namespace torsio {
+
+/// What the arm follows in one tick.
+enum class ArmMode : std::uint8_t {
+  joints,     ///< each joint its own reference, in any mode of its `JointController`
+  position,   ///< angles, speeds and accelerations of the links, by computed torque
+  impedance,  ///< a spring and damper at each joint, the arm's weight carried
+  cartesian,  ///< springs and dampers at the flange
+  guiding,    ///< no torque beyond the arm's weight: it is moved by hand
+};
+
+struct ArmReference {
+  ArmMode mode = ArmMode::position;
+  ArmDynamics::PerJoint position_rad = {};    ///< position, impedance; the posture in cartesian
+  ArmDynamics::PerJoint velocity_rad_s = {};  ///< position, impedance
+  ArmDynamics::PerJoint acceleration_rad_s2 = {};         ///< position
+  ArmDynamics::PerJoint stiffness_Nm_rad = {};            ///< impedance
+  ArmDynamics::PerJoint damping_Nms_rad = {};             ///< impedance
+  ArmFrame flange = {};                                   ///< cartesian, in the frame of the base
+  std::array<JointReference, kMaxArmJoints> joints = {};  ///< joints
+};
+
+/// Why an arm was stopped.
+enum class ArmStopCause : std::uint8_t {
+  none,
+  requested,    ///< by `ArmController::stop`
+  measurement,  ///< a joint's sample was not finite for too many ticks
+  monitor,      ///< the monitor of a joint
+  controller,   ///< a reference or an output of a joint's controller was not finite
+  overload,     ///< the external torque of a joint exceeded its limit for too long
+};
+
+/// The controllers of an arm of series-elastic joints in one step:
+///
+///     angles, currents -> torque of each spring with error bar (`TorqueEstimator` or `MonitoredTorque`)
+///                      -> external torque (`MomentumObserver`)
+///     reference        -> torque that the links need, from the arm's dynamics -> `JointStop` -> `JointController`
+///                      -> current, power and brake of each joint
+///
+/// With τ_b(q̇) = F_b tanh(q̇ / v₀) + d q̇, the friction of the bearings between springs and links:
+///
+///     position    τ* = M(q*) q̈* + c(q*, q̇*) + g(q*) + τ_b(q̇*) + F_c tanh(q̇* / v₀) + F_v q̇*, fed forward in the
+///                 position mode of the joint, which follows the motor side: θ* = q* + τ_s / K + k ∫ (q* − q) dt, τ_s the
+///                 part of τ* that the spring carries
+///     impedance   τ_ff = g(q) + τ_b(q̇), in the impedance mode of the joint
+///     cartesian   τ* = `CartesianImpedance` + s τ_b(q̇), in its torque mode
+///     guiding     τ* = c(q, q̇) + g(q) + s τ_b(q̇), in its torque mode
+///
+/// s = `friction_share` below 1: more friction than there is must not be compensated. The wanted motion gives the
+/// friction its sign where there is one, the measured one elsewhere.
+///
+/// A fault in one joint stops all of them: each goes to rest by its own `JointStop`, a joint without a usable measurement
+/// without power and with its brake. The stop is latched until `release`.
+///
+/// Paper 000 section 6.4 has the arm; the control of the whole arm is ours.
+class ArmController {
+ public:
+  struct Joint {
+    JointControllerCore::Settings control = {};  ///< with the motor side's limits of the joint
+    AnyInverse inverse = LinearInverse(1.0);
+    JointStop::Settings stop = {};
+    /// The torque of the spring; none: its stiffness times the deflection.
+    std::optional<TorqueEstimator> estimator = {};
+    /// Replaces the estimator: redundant torques and their monitor, which stops the arm once it watches.
+    std::optional<MonitoredTorque> monitored = {};
+    double bearing_Nm = 0.0;           ///< F_b, dry friction between spring and link
+    double viscous_Nms_rad = 0.0;      ///< d
+    double largest_external_Nm = 0.0;  ///< above it for `longest_overload_s`: a stop
+  };
+  struct Settings {
+    ArmModel arm = {};
+    std::vector<Joint> joints = {};
+    double speed_cutoff_Hz = 60.0;         ///< low-pass of the measured speed of the links
+    double friction_speed_rad_s = 0.02;    ///< v₀
+    double friction_share = 0.7;           ///< s
+    double link_correction_1_s = 2.0;      ///< k; 0: none
+    double largest_correction_rad = 0.05;  ///< limit of the integral k ∫ (q* − q) dt
+    /// The position mode does not begin farther from the measured angles than this: the reference is refused.
+    double largest_start_error_rad = 0.05;
+    MomentumObserver::Settings observer = {};
+    std::optional<CartesianImpedance::Settings> cartesian = {};  ///< none: the mode is refused
+    std::uint32_t tolerated_losses =
+        3;  ///< ticks in a row in which a joint's sample may be missing
+    double longest_overload_s = 0.02;
+    StopCategory stop_category =
+        StopCategory::ramp_and_brake;  ///< category of a stop after a fault
+  };
+
+  struct JointOutput {
+    double current_A = 0.0;
+    bool is_powered = true;
+    bool is_brake_open = true;
+    Estimate torque = {};      ///< torque of the spring
+    double wanted_Nm = 0.0;    ///< torque that the links need, friction included
+    double external_Nm = 0.0;  ///< external torque, of the observer
+    double speed_rad_s = 0.0;  ///< measured, of the link
+    JointStop::Phase phase = JointStop::Phase::running;
+    JointCascade::Limit limit = JointCascade::Limit::none;
+    Fault fault = Fault::none;
+  };
+  struct Output {
+    std::array<JointOutput, kMaxArmJoints> joints = {};
+    ArmStopCause cause = ArmStopCause::none;  ///< cause of the stop that is in effect
+    std::size_t joint = 0;                    ///< in which it was found
+    bool is_at_rest = false;                  ///< all drives, measured, after a stop
+    bool is_reference_refused =
+        false;                    ///< not finite, or a mode that is not configured: the arm holds
+    double manipulability = 1.0;  ///< cartesian
+    bool is_singular = false;     ///< cartesian
+  };
+
+  /// @throws Error as the parts, if the numbers of joints differ, or a setting is out of range; the message names the
+  /// joint.
+  ArmController(Settings settings, double sample_rate_Hz);
+
+  /// As after the construction: memories are cleared, and the arm is stopped without power, the brakes closed, until
+  /// `release`.
+  void reset() noexcept;
+
+  /// Begins a stop of all joints.
+  void stop(StopCategory category) noexcept TORSIO_REALTIME;
+  /// Ends a stop when all joints are at rest. @returns false, and nothing changes, if one is not
+  [[nodiscard]] bool release() noexcept TORSIO_REALTIME;
+
+  /// @param samples one per joint
+  /// @returns valid until the next call
+  const Output& step(const ArmReference& reference,
+                     std::span<const JointSample> samples) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] const ArmDynamics& dynamics() const noexcept { return dynamics_; }
+  /// As `ArmDynamics::set_payload`, from the next step on.
+  bool set_payload(const BodyInertia& payload) noexcept TORSIO_REALTIME {
+    return dynamics_.set_payload(payload);
+  }
+  [[nodiscard]] std::size_t size() const noexcept { return joints_.size(); }
+  [[nodiscard]] MonitoredTorque* monitored(std::size_t joint) noexcept {
+    return joints_[joint].monitored ? &*joints_[joint].monitored : nullptr;
+  }
+
+ private:
+  /// The parts and the memory of one joint.
+  struct Axis {
+    Axis(Joint&& from, double sample_rate_Hz, double speed_cutoff_Hz);
+
+    JointController<AnyInverse> controller;
+    JointStop stop;
+    std::optional<TorqueEstimator> estimator;
+    std::optional<MonitoredTorque> monitored;
+    std::vector<SignalSample> monitored_inputs;
+    std::vector<double JointSample::*> monitored_channels;
+    Differentiator speed;      ///< speed of the link, filtered
+    Differentiator raw_speed;  ///< for the observer
+    Drive drive;
+    double stiffness_Nm_rad;
+    double bearing_Nm;
+    double viscous_Nms_rad;
+    double largest_external_Nm;
+    double correction_rad = 0.0;
+    JointState measured = {};  ///< motor side, one tick ago
+    std::uint32_t lost = 0;    ///< ticks in a row without a sample
+    double overloaded_s = 0.0;
+  };
+
+  bool sense(std::span<const JointSample> samples) noexcept;
+  void estimate(std::span<const JointSample> samples) noexcept;
+  void supervise(std::span<const JointSample> samples) noexcept;
+  void find(ArmStopCause cause, std::size_t joint) noexcept;
+  [[nodiscard]] bool is_usable(const ArmReference& reference) const noexcept;
+  [[nodiscard]] bool is_near(const ArmReference& reference) const noexcept;
+  void hold() noexcept;
+  void references(const ArmReference& reference) noexcept;
+  void follow_position(const ArmReference& reference) noexcept;
+  [[nodiscard]] double bearing_torque(const Axis& axis, double speed_rad_s) const noexcept;
+
+  Settings settings_;  ///< without the joints, which are in `joints_`
+  double period_s_;
+  ArmDynamics dynamics_;
+  MomentumObserver observer_;
+  std::optional<CartesianImpedance> cartesian_;
+  std::vector<Axis> joints_;
+  ArmDynamics::PerJoint angle_rad_ = {};
+  ArmDynamics::PerJoint speed_rad_s_ = {};
+  ArmDynamics::PerJoint raw_speed_rad_s_ = {};
+  ArmDynamics::PerJoint spring_Nm_ = {};
+  std::array<JointReference, kMaxArmJoints> references_ = {};
+  ArmReference holding_ =
+      {};  ///< where the arm was at the first step, or when a reference was refused
+  bool is_started_ = false;
+  bool is_holding_ = false;
+  bool is_following_ = false;  ///< a reference of the position mode was accepted in the last tick
+  Output output_;
+};
+
+/// The enumerators' own spelling.
+[[nodiscard]] std::string_view name(ArmMode mode) noexcept;
+[[nodiscard]] std::string_view name(ArmStopCause cause) noexcept;
+
+}  // namespace torsio

@@ -1,0 +1,376 @@
+#include "torsio/arm/arm_controller.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "core/checks.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kPlace = "arm controller";
+
+bool is_finite(const ArmDynamics::PerJoint& values) noexcept {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+bool is_finite(const ArmFrame& frame) noexcept {
+  const auto finite = [](double value) { return std::isfinite(value); };
+  return std::ranges::all_of(frame.position_m, finite) &&
+         std::ranges::all_of(frame.rotation, finite);
+}
+bool is_finite(const JointSample& sample) noexcept {
+  return std::isfinite(sample.motor_angle_rad + sample.gear_angle_rad + sample.joint_angle_rad);
+}
+
+struct ChannelOfSample {
+  std::string_view name;
+  double JointSample::*value;
+};
+constexpr std::array kChannels{ChannelOfSample{"motor_angle_rad", &JointSample::motor_angle_rad},
+                               ChannelOfSample{"gear_angle_rad", &JointSample::gear_angle_rad},
+                               ChannelOfSample{"joint_angle_rad", &JointSample::joint_angle_rad},
+                               ChannelOfSample{"motor_current_A", &JointSample::motor_current_A}};
+
+double JointSample::*channel_of(std::string_view name) {
+  const auto found = std::ranges::find(kChannels, name, &ChannelOfSample::name);
+  if (found == kChannels.end())
+    throw Error({.place = fmt::format("{}: monitor", kPlace),
+                 .expected = "the channels motor_angle_rad, gear_angle_rad, joint_angle_rad and "
+                             "motor_current_A",
+                 .found = std::string(name)});
+  return found->value;
+}
+
+}  // namespace
+
+ArmController::Axis::Axis(Joint&& from, double sample_rate_Hz, double speed_cutoff_Hz)
+    : controller(std::move(from.inverse), from.control, sample_rate_Hz),
+      stop(from.stop, sample_rate_Hz),
+      estimator(std::move(from.estimator)),
+      monitored(std::move(from.monitored)),
+      speed(sample_rate_Hz, speed_cutoff_Hz),
+      raw_speed(sample_rate_Hz),
+      drive(from.control.torque.deflection.joint.drive),
+      stiffness_Nm_rad(from.control.torque.deflection.joint.stiffness_Nm_rad),
+      bearing_Nm(from.bearing_Nm),
+      viscous_Nms_rad(from.viscous_Nms_rad),
+      largest_external_Nm(from.largest_external_Nm) {
+  require_not_negative(kPlace, "the friction of the bearing", bearing_Nm);
+  require_not_negative(kPlace, "the viscous friction of the bearing", viscous_Nms_rad);
+  require_positive(kPlace, "the largest external torque", largest_external_Nm);
+  if (!monitored) return;
+  for (const std::string& input : monitored->raw_inputs())
+    monitored_channels.push_back(channel_of(input));
+  monitored_inputs.resize(monitored_channels.size());
+}
+
+ArmController::ArmController(Settings settings, double sample_rate_Hz)
+    : settings_(std::move(settings)),
+      period_s_(1.0 / sample_rate_Hz),
+      dynamics_(settings_.arm),
+      observer_(settings_.arm.joints.size(), settings_.observer, sample_rate_Hz) {
+  require(settings_.joints.size() == dynamics_.size(), kPlace,
+          fmt::format("{} joints, as in the arm", dynamics_.size()),
+          fmt::format("{}", settings_.joints.size()));
+  require_positive(kPlace, "the speed of friction", settings_.friction_speed_rad_s);
+  require_parameter(settings_.friction_share >= 0.0 && settings_.friction_share <= 1.0, kPlace,
+                    "a share of friction from 0 to 1", settings_.friction_share);
+  require_not_negative(kPlace, "the correction of the links", settings_.link_correction_1_s);
+  require_not_negative(kPlace, "the largest correction", settings_.largest_correction_rad);
+  require_positive(kPlace, "the longest overload", settings_.longest_overload_s);
+  if (settings_.cartesian) cartesian_.emplace(*settings_.cartesian);
+  joints_.reserve(dynamics_.size());
+  for (std::size_t j = 0; j < dynamics_.size(); ++j) {
+    try {
+      joints_.emplace_back(std::move(settings_.joints[j]), sample_rate_Hz,
+                           settings_.speed_cutoff_Hz);
+    } catch (const Error& error) {
+      ErrorReport report = error.report();
+      report.place = fmt::format("joint '{}': {}", settings_.arm.joints[j].name, report.place);
+      throw Error(std::move(report));
+    }
+  }
+  settings_.joints.clear();
+  reset();
+}
+
+void ArmController::reset() noexcept {
+  for (Axis& axis : joints_) {
+    axis.controller.reset();
+    axis.stop.trigger(StopCategory::power_off);
+    if (axis.estimator) axis.estimator->reset();
+    if (axis.monitored) axis.monitored->reset();
+    axis.speed.reset();
+    axis.raw_speed.reset();
+    axis.correction_rad = 0.0;
+    axis.measured = {};
+    axis.lost = 0;
+    axis.overloaded_s = 0.0;
+  }
+  observer_.reset();
+  output_ = {.cause = ArmStopCause::requested};
+  is_started_ = false;
+  is_holding_ = false;
+  is_following_ = false;
+}
+
+void ArmController::stop(StopCategory category) noexcept {
+  for (Axis& axis : joints_) axis.stop.trigger(category);
+  if (output_.cause == ArmStopCause::none) output_.cause = ArmStopCause::requested;
+}
+
+void ArmController::find(ArmStopCause cause, std::size_t joint) noexcept {
+  if (output_.cause == ArmStopCause::none) {
+    output_.cause = cause;
+    output_.joint = joint;
+  }
+  for (Axis& axis : joints_) axis.stop.trigger(settings_.stop_category);
+}
+
+bool ArmController::release() noexcept {
+  if (!output_.is_at_rest) return false;
+  for (Axis& axis : joints_)
+    if (axis.lost > 0 || (axis.stop.phase() != JointStop::Phase::running && !axis.stop.release()))
+      return false;
+  output_.cause = ArmStopCause::none;
+  hold();
+  return true;
+}
+
+double ArmController::bearing_torque(const Axis& axis, double speed_rad_s) const noexcept {
+  return axis.bearing_Nm * std::tanh(speed_rad_s / settings_.friction_speed_rad_s) +
+         axis.viscous_Nms_rad * speed_rad_s;
+}
+
+const ArmController::Output& ArmController::step(const ArmReference& reference,
+                                                 std::span<const JointSample> samples) noexcept {
+  if (samples.size() != joints_.size()) {
+    find(ArmStopCause::measurement, 0);
+    samples = {};
+  }
+  const bool is_complete = sense(samples);
+  estimate(samples);
+  supervise(samples);
+  if (is_complete && !is_started_) {
+    hold();
+    is_started_ = true;
+  }
+  output_.is_reference_refused = !is_usable(reference) || !is_near(reference);
+  is_following_ = !output_.is_reference_refused && output_.cause == ArmStopCause::none &&
+                  reference.mode == ArmMode::position;
+  if (output_.is_reference_refused && !is_holding_) hold();
+  is_holding_ = output_.is_reference_refused;
+  references(output_.is_reference_refused ? holding_ : reference);
+
+  output_.is_at_rest = true;
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Axis& axis = joints_[j];
+    JointOutput& out = output_.joints[j];
+    const JointSample sample = samples.empty() ? JointSample{} : samples[j];
+    const JointReference allowed = axis.stop.reference(references_[j], axis.measured);
+    const auto controlled = axis.controller.step(allowed, sample);
+    // A sample that is missing for a tick or two fades the current, and is not yet a fault of the stop.
+    const bool is_tolerated = axis.lost > 0 && axis.lost <= settings_.tolerated_losses;
+    if (!is_tolerated) axis.measured = controlled.state;
+    const auto command = axis.stop.step(controlled.current_A, axis.measured,
+                                        is_tolerated ? Fault::none : controlled.fault);
+    if (command.is_current_cut) axis.controller.track(command.current_A);
+    out.current_A = command.current_A;
+    out.is_powered = command.is_powered;
+    out.is_brake_open = command.is_brake_open;
+    out.phase = command.phase;
+    out.limit = controlled.limit;
+    out.fault = controlled.fault;
+    output_.is_at_rest = output_.is_at_rest && command.is_drive_at_rest;
+  }
+  return output_;
+}
+
+// Angles and speeds; those of a joint without a sample stay.
+bool ArmController::sense(std::span<const JointSample> samples) noexcept {
+  bool is_complete = !samples.empty();
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Axis& axis = joints_[j];
+    if (samples.empty() || !is_finite(samples[j])) {
+      axis.lost = std::min(axis.lost + 1, settings_.tolerated_losses + 1);
+      axis.speed.skip();
+      axis.raw_speed.skip();
+      is_complete = false;
+      continue;
+    }
+    axis.lost = 0;
+    angle_rad_[j] = samples[j].joint_angle_rad;
+    speed_rad_s_[j] = axis.speed.step(angle_rad_[j]);
+    raw_speed_rad_s_[j] = axis.raw_speed.step(angle_rad_[j]);
+    output_.joints[j].speed_rad_s = speed_rad_s_[j];
+  }
+  return is_complete;
+}
+
+void ArmController::estimate(std::span<const JointSample> samples) noexcept {
+  ArmDynamics::PerJoint on_links_Nm = {};
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Axis& axis = joints_[j];
+    const JointSample sample = samples.empty() ? JointSample{} : samples[j];
+    Estimate torque;
+    if (axis.monitored) {
+      for (std::size_t i = 0; i < axis.monitored_channels.size(); ++i)
+        axis.monitored_inputs[i] = {.value = sample.*axis.monitored_channels[i]};
+      const FusedTorque fused = axis.monitored->step(sample.t_s, axis.monitored_inputs);
+      torque = {.value = fused.value_Nm, .std_dev = fused.std_dev_Nm, .fault = fused.fault};
+    } else if (axis.estimator) {
+      torque = axis.estimator->step(sample);
+    } else {
+      torque.value = axis.stiffness_Nm_rad * sample.spring_deflection_rad();
+      if (!std::isfinite(torque.value))
+        torque = {.value = spring_Nm_[j], .fault = Fault::input_not_finite};
+    }
+    output_.joints[j].torque = torque;
+    spring_Nm_[j] = torque.value;
+    on_links_Nm[j] = torque.value - bearing_torque(axis, speed_rad_s_[j]);
+  }
+  (void)observer_.step(dynamics_, angle_rad_, raw_speed_rad_s_, on_links_Nm);
+  const auto external_Nm = observer_.external_torque_Nm();
+  for (std::size_t j = 0; j < joints_.size(); ++j) output_.joints[j].external_Nm = external_Nm[j];
+}
+
+void ArmController::supervise(std::span<const JointSample> samples) noexcept {
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Axis& axis = joints_[j];
+    if (axis.lost > settings_.tolerated_losses || samples.empty())
+      find(ArmStopCause::measurement, j);
+    if (axis.monitored && axis.monitored->monitor().state() == Monitor::State::stopped)
+      find(ArmStopCause::monitor, j);
+    const bool is_overloaded = std::abs(output_.joints[j].external_Nm) > axis.largest_external_Nm;
+    axis.overloaded_s = is_overloaded ? axis.overloaded_s + period_s_ : 0.0;
+    if (axis.overloaded_s > settings_.longest_overload_s) find(ArmStopCause::overload, j);
+  }
+}
+
+bool ArmController::is_usable(const ArmReference& reference) const noexcept {
+  switch (reference.mode) {
+    case ArmMode::joints:
+      return std::ranges::all_of(std::span(reference.joints).first(joints_.size()),
+                                 [](const JointReference& of) { return torsio::is_finite(of); });
+    case ArmMode::position:
+    case ArmMode::impedance:
+      return is_finite(reference.position_rad) && is_finite(reference.velocity_rad_s) &&
+             is_finite(reference.acceleration_rad_s2) && is_finite(reference.stiffness_Nm_rad) &&
+             is_finite(reference.damping_Nms_rad);
+    case ArmMode::cartesian:
+      return cartesian_ && is_finite(reference.flange) && is_finite(reference.position_rad);
+    case ArmMode::guiding: return true;
+  }
+  return false;
+}
+
+bool ArmController::is_near(const ArmReference& reference) const noexcept {
+  if (reference.mode != ArmMode::position || is_following_) return true;
+  for (std::size_t j = 0; j < joints_.size(); ++j)
+    if (!(std::abs(reference.position_rad[j] - angle_rad_[j]) <= settings_.largest_start_error_rad))
+      return false;
+  return true;
+}
+
+void ArmController::hold() noexcept {
+  holding_ = {.mode = ArmMode::position, .position_rad = angle_rad_};
+  for (Axis& axis : joints_) axis.correction_rad = 0.0;
+}
+
+void ArmController::references(const ArmReference& reference) noexcept {
+  output_.manipulability = 1.0;
+  output_.is_singular = false;
+  ArmDynamics::PerJoint torque_Nm = {};
+  ArmDynamics::JointMatrix mass_kg_m2;
+  switch (reference.mode) {
+    case ArmMode::joints:
+      std::ranges::copy_n(reference.joints.begin(), static_cast<std::ptrdiff_t>(joints_.size()),
+                          references_.begin());
+      for (std::size_t j = 0; j < joints_.size(); ++j)
+        output_.joints[j].wanted_Nm = references_[j].torque_Nm;
+      return;
+    case ArmMode::position: follow_position(reference); return;
+    case ArmMode::impedance: dynamics_.gravity_torque(angle_rad_, torque_Nm); break;
+    case ArmMode::cartesian: {
+      const auto task =
+          cartesian_->step(dynamics_, angle_rad_, speed_rad_s_,
+                           {.flange = reference.flange, .posture_rad = reference.position_rad});
+      torque_Nm = task.torque_Nm;
+      output_.manipulability = task.manipulability;
+      output_.is_singular = task.is_singular;
+      break;
+    }
+    case ArmMode::guiding:
+      dynamics_.equation(angle_rad_, speed_rad_s_, mass_kg_m2, torque_Nm);
+      break;
+  }
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const double wanted_Nm =
+        torque_Nm[j] + settings_.friction_share * bearing_torque(joints_[j], speed_rad_s_[j]);
+    output_.joints[j].wanted_Nm = wanted_Nm;
+    references_[j] = {.mode = JointMode::torque, .torque_Nm = wanted_Nm};
+    if (reference.mode != ArmMode::impedance) continue;
+    references_[j] = {
+        .mode = JointMode::impedance,
+        .position_rad = reference.position_rad[j] + torque_Nm[j] / joints_[j].stiffness_Nm_rad,
+        .velocity_rad_s = reference.velocity_rad_s[j],
+        .torque_Nm = wanted_Nm,
+        .stiffness_Nm_rad = reference.stiffness_Nm_rad[j],
+        .damping_Nms_rad = reference.damping_Nms_rad[j]};
+  }
+}
+
+void ArmController::follow_position(const ArmReference& reference) noexcept {
+  ArmDynamics::PerJoint torque_Nm = {};
+  dynamics_.inverse(reference.position_rad, reference.velocity_rad_s, reference.acceleration_rad_s2,
+                    torque_Nm);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Axis& axis = joints_[j];
+    const double speed_rad_s = reference.velocity_rad_s[j];
+    const double spring_Nm = torque_Nm[j] + bearing_torque(axis, speed_rad_s);
+    const double drive_Nm =
+        axis.drive.coulomb_Nm * std::tanh(speed_rad_s / settings_.friction_speed_rad_s) +
+        axis.drive.viscous_Nms_rad * speed_rad_s;
+    axis.correction_rad =
+        std::clamp(axis.correction_rad + settings_.link_correction_1_s * period_s_ *
+                                             (reference.position_rad[j] - angle_rad_[j]),
+                   -settings_.largest_correction_rad, settings_.largest_correction_rad);
+    output_.joints[j].wanted_Nm = spring_Nm;
+    references_[j] = {.mode = JointMode::position,
+                      .position_rad = reference.position_rad[j] +
+                                      spring_Nm / axis.stiffness_Nm_rad + axis.correction_rad,
+                      .velocity_rad_s = speed_rad_s,
+                      .acceleration_rad_s2 = reference.acceleration_rad_s2[j],
+                      .torque_Nm = spring_Nm + settings_.friction_share * drive_Nm};
+  }
+}
+
+std::string_view name(ArmMode mode) noexcept {
+  switch (mode) {
+    case ArmMode::joints: return "joints";
+    case ArmMode::position: return "position";
+    case ArmMode::impedance: return "impedance";
+    case ArmMode::cartesian: return "cartesian";
+    case ArmMode::guiding: return "guiding";
+  }
+  return "unknown";
+}
+
+std::string_view name(ArmStopCause cause) noexcept {
+  switch (cause) {
+    case ArmStopCause::none: return "none";
+    case ArmStopCause::requested: return "requested";
+    case ArmStopCause::measurement: return "measurement";
+    case ArmStopCause::monitor: return "monitor";
+    case ArmStopCause::controller: return "controller";
+    case ArmStopCause::overload: return "overload";
+  }
+  return "unknown";
+}
+
+}  // namespace torsio
