@@ -1,3 +1,5 @@
+#include "sim/plant/plant_parameters.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +9,6 @@
 #include <variant>
 #include <vector>
 
-#include "sim/plant/plant.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/dispatch.hpp"
 

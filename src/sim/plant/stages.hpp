@@ -1,12 +1,23 @@
 #pragma once
 
 #include <concepts>
+#include <variant>
 
-#include "sim/plant/plant.hpp"
+#include "sim/plant/plant_parameters.hpp"
 
 // What a plant asks of a stage, whatever it is.
 
 namespace torsio {
+
+/// Between rotor and middle body, and between middle body and joint.
+using FirstStage = std::variant<Gear, SlipClutch>;
+using SecondStage = std::variant<Spring, ElastomerCoupling, RubberSpring, Gear>;
+
+/// What a stage does to the bodies at its two ends.
+struct StageTorques {
+  double output_Nm = 0.0;  ///< on the output body
+  double input_Nm = 0.0;   ///< against the input body
+};
 
 struct StageMotion {
   double input_angle_rad = 0.0;
