@@ -91,7 +91,8 @@ Layers layers() {
     for (const std::string& folder : matches(cells[1].str(), "`([^`]+)`"))
       layers.folders[folder] = {.row = row, .library = cells[2].str()};
   }
-  layers.uses = {{"runtime", {}}, {"files", {"runtime"}}, {"realtime", {"runtime"}}};
+  layers.uses = {
+      {"runtime", {}}, {"files", {"runtime"}}, {"realtime", {"runtime"}}, {"arm", {"runtime"}}};
   const std::string cmake = file_bytes(kRoot / "src/CMakeLists.txt");
   const std::regex library(R"(torsio_slow_library\((\w+)\s[^)]*?USES ([a-z ]+))");
   for (std::sregex_iterator at(cmake.begin(), cmake.end(), library); at != std::sregex_iterator();
@@ -129,7 +130,7 @@ TEST(Layers, AreThoseOfTheTable) {
   EXPECT_EQ(found.folder_of("data/csv/csv.cpp"), "data");
   EXPECT_EQ(found.folders.at("core").library, "runtime");
   EXPECT_THAT(found.uses.at("learn"), ElementsAre("data", "files", "realtime", "runtime"));
-  EXPECT_THAT(found.uses.at("bench"), ElementsAre("data", "files", "realtime", "runtime"));
+  EXPECT_THAT(found.uses.at("bench"), ElementsAre("arm", "data", "files", "realtime", "runtime"));
   EXPECT_TRUE(found.uses.at("coupling").contains("trials"));
 }
 
