@@ -64,6 +64,8 @@ constexpr std::array kBenches{
     Bench{"simulate_batched_held", simulate_batched_held},
     Bench{"simulate_batched_bouc_wen", simulate_batched_bouc_wen},
     Bench{"simulate_batched_lugre", simulate_batched_lugre},
+    Bench{"arm_simulate", arm_simulate, Peer{"MuJoCo", write_arm_inputs}},
+    Bench{"arm_simulate_gears", arm_simulate_gears, Peer{"MuJoCo", write_arm_gears_inputs}},
     Bench{"lstm250_step", lstm250_step, Peer{"libtorch", write_lstm250}},
     Bench{"lstm32_step", lstm32_step, Peer{"libtorch", write_lstm32}},
     Bench{"gru64_step", gru64_step, Peer{"libtorch", write_gru64}},

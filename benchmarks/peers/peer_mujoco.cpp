@@ -1,13 +1,19 @@
-// Steps per second of MuJoCo on a plain motor, spring and link, one thread: what simulate_single does
-// without hysteresis, friction, play, ripple, gear error, gear elasticity or current loop, which a
-// MuJoCo joint does not have. Euler, 0.1 ms, no contacts.
+// Steps per second of MuJoCo, one thread, Euler, 0.1 ms, no contacts, without hysteresis, friction, play,
+// ripple, gear error or current loop, which a MuJoCo joint does not have.
 //
-// Usage: peer_mujoco FOLDER; prints steps/s. Reads commands_A.f64, the motor current at each step.
+// simulate_single: a plain motor, spring and link, without the elasticity of the gear. Reads
+// commands_A.f64, the motor current at each step.
+// arm_simulate, arm_simulate_gears: six joints of a rotor and a plain spring; of a rotor, a gear and a
+// plain spring. Reads arm.xml, and arm_commands_A.f64, the currents of all motors at each step.
+//
+// Usage: peer_mujoco ROW FOLDER; prints steps/s.
 
 #include <mujoco/mujoco.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <fstream>
 #include <stdexcept>
@@ -46,7 +52,6 @@ std::vector<double> read(const std::string& file) {
 }
 
 mjModel* load(const std::string& file) {
-  std::ofstream(file) << kModel;
   char message[1000] = "";
   mjModel* const model = mj_loadXML(file.c_str(), nullptr, message, sizeof(message));
   if (model == nullptr) throw std::runtime_error(message);
@@ -56,16 +61,22 @@ mjModel* load(const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 2) throw std::runtime_error("usage: peer_mujoco FOLDER");
-  const std::string folder = std::string(argv[1]) + "/";
-  const std::vector<double> commands = read(folder + "commands_A.f64");
-  mjModel* const model = load(folder + "motor_spring_link.xml");
+  if (argc != 3) throw std::runtime_error("usage: peer_mujoco ROW FOLDER");
+  const bool is_arm = std::string(argv[1]) != "simulate_single";
+  const std::string folder = std::string(argv[2]) + "/";
+  const std::string file = folder + (is_arm ? "arm.xml" : "motor_spring_link.xml");
+  if (!is_arm) std::ofstream(file) << kModel;
+  const std::vector<double> commands =
+      read(folder + (is_arm ? "arm_commands_A.f64" : "commands_A.f64"));
+  mjModel* const model = load(file);
   mjData* const data = mj_makeData(model);
+  const auto motors = static_cast<std::size_t>(model->nu);
   double best = 1e300;
   for (int run = 0; run < 20; ++run) {
+    if (is_arm) mj_resetData(model, data);
     const auto begin = std::chrono::steady_clock::now();
-    for (const double current_A : commands) {
-      data->ctrl[0] = current_A;
+    for (std::size_t at = 0; at < commands.size(); at += motors) {
+      std::copy_n(commands.data() + at, motors, data->ctrl);
       mj_step(model, data);
     }
     const std::chrono::duration<double> span = std::chrono::steady_clock::now() - begin;
@@ -73,7 +84,7 @@ int main(int argc, char** argv) try {
   }
   if (!std::isfinite(data->qpos[1]) || data->qpos[1] == 0.0)
     throw std::runtime_error("MuJoCo's spring does not move");
-  std::printf("%.6g\n", static_cast<double>(commands.size()) / best);
+  std::printf("%.6g\n", static_cast<double>(commands.size() / motors) / best);
   mj_deleteData(data);
   mj_deleteModel(model);
 } catch (const std::exception& error) {
