@@ -51,8 +51,7 @@ class ArmSystem {
     to(j, j) += slopes.joint();
     to(j, middle) = to(middle, j) = coupled;
     if (is_rigid_) {
-      to(middle, middle) = slopes.middle() - slopes.first +
-                           slopes.on_rotor * slopes.first_ratio * slopes.first_ratio;
+      to(middle, middle) = slopes.rigid_middle();
       return;
     }
     to(middle, middle) = slopes.middle();

@@ -25,6 +25,11 @@ struct ChainSlopes {
     return first + second / (second_ratio * second_ratio) + on_middle;
   }
   [[nodiscard]] double joint() const noexcept { return second + on_joint; }
+  /// Rotor and middle body as one, which turn together over a rigid first stage.
+  [[nodiscard]] double rigid_middle() const noexcept {
+    return second / (second_ratio * second_ratio) + on_middle +
+           on_rotor * first_ratio * first_ratio;
+  }
 };
 
 /// @returns the largest stiffness [Nm/rad], with all friction sticking, up to the rated torque

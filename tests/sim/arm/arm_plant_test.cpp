@@ -250,6 +250,42 @@ TEST(ArmPlant, AWornDriveHasMoreFriction) {
   EXPECT_DOUBLE_EQ(worn.torques(0).rotor_friction_Nm, 3.0 * sound.torques(0).rotor_friction_Nm);
 }
 
+TEST(ArmPlant, ItsBrakesHoldItWithoutCurrentAndItFallsWithoutThem) {
+  for (const FirstStageForm form : kForms) {
+    ArmPlant arm = arm_with_8_kg(form);
+    const Brake::Parameters brakes[] = {brake_parameters(data_sheet("dfki-300")),
+                                        brake_parameters(data_sheet("dfki-120")),
+                                        brake_parameters(data_sheet("dfki-28"))};
+    for (std::size_t j = 0; j < kJoints; ++j) arm.use(j, brakes[j < 2 ? 0 : j < 3 ? 1 : 2]);
+    for (const bool is_closed : {true, false}) {
+      ASSERT_EQ(arm.reset(kBent), Fault::none);
+      Commands commands;
+      commands.fill({.is_powered = false, .brake_V = is_closed ? 0.0 : 1e3});
+      for (std::size_t j = 0; j < kJoints; ++j) arm.set_brake(j, is_closed);
+      for (int i = 0; i < 5000; ++i) ASSERT_EQ(arm.step(commands, {}, kStep_s), Fault::none);
+      const double moved_rad = std::abs(arm.state(1).joint_angle_rad - kBent[1]);
+      if (is_closed) {
+        EXPECT_LT(moved_rad, 0.02);
+      } else {
+        EXPECT_GT(moved_rad, 0.1);
+      }
+      EXPECT_EQ(arm.current(1), 0.0);
+    }
+  }
+}
+
+TEST(ArmPlant, TakesMotorsWithWindings) {
+  ArmPlant arm = arm_with_8_kg(FirstStageForm::rigid);
+  arm.use(2, electrical_parameters(data_sheet("dfki-120"), 1));
+  ASSERT_EQ(arm.reset(kBent), Fault::none);
+  Commands commands;
+  for (std::size_t j = 0; j < kJoints; ++j) commands[j].current_A = arm.current(j);
+  const double expected_A = arm.current(2);
+  for (int i = 0; i < 2000; ++i) ASSERT_EQ(arm.step(commands, {}, kStep_s), Fault::none);
+  EXPECT_NEAR(arm.current(2), expected_A, 0.1 * std::abs(expected_A));
+  EXPECT_GT(arm.drive(2).electrical()->energy().copper_J, 0.0);
+}
+
 TEST(ArmPlant, DividesItsStepWhereTheLastLinkHasLittleInertia) {
   const std::vector<PlantParameters> drives = test::arm6_drives();
   const double stiffest_Nm_rad =
