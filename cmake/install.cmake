@@ -5,11 +5,13 @@ include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 
-install(TARGETS torsio_runtime torsio_files torsio_arm EXPORT torsioTargets FILE_SET HEADERS
+install(TARGETS torsio_runtime torsio_files EXPORT torsioTargets FILE_SET HEADERS
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT torsioTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 install(TARGETS torsio_realtime EXPORT torsioRealtimeTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT torsioRealtimeTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+install(TARGETS torsio_arm EXPORT torsioArmTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT torsioArmTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 if(TORSIO_BUILD_LAB)
   install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
   if(NOT CMAKE_CROSSCOMPILING)

@@ -73,6 +73,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   add_demo(app);
   add_simulate(app);
+  add_arm(app);
   add_check(app);
   add_fit(app);
   add_evaluate(app);

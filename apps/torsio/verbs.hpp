@@ -6,6 +6,7 @@
 /// `torsio::Error`; main turns that into a message and an exit code (0 success, 1 the work failed,
 /// 2 the call was wrong).
 void add_simulate(CLI::App& app);
+void add_arm(CLI::App& app);
 void add_check(CLI::App& app);
 void add_fit(CLI::App& app);
 void add_drift(CLI::App& app);

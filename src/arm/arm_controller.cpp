@@ -55,6 +55,7 @@ ArmController::Axis::Axis(Joint&& from, double sample_rate_Hz, double speed_cuto
       monitored(std::move(from.monitored)),
       speed(sample_rate_Hz, speed_cutoff_Hz),
       raw_speed(sample_rate_Hz),
+      motor_speed(sample_rate_Hz, from.control.speed_cutoff_Hz),
       drive(from.control.torque.deflection.joint.drive),
       stiffness_Nm_rad(from.control.torque.deflection.joint.stiffness_Nm_rad),
       bearing_Nm(from.bearing_Nm),
@@ -107,6 +108,7 @@ void ArmController::reset() noexcept {
     if (axis.monitored) axis.monitored->reset();
     axis.speed.reset();
     axis.raw_speed.reset();
+    axis.motor_speed.reset();
     axis.correction_rad = 0.0;
     axis.measured = {};
     axis.lost = 0;
@@ -176,7 +178,6 @@ const ArmController::Output& ArmController::step(const ArmReference& reference,
     const auto controlled = axis.controller.step(allowed, sample);
     // A sample that is missing for a tick or two fades the current, and is not yet a fault of the stop.
     const bool is_tolerated = axis.lost > 0 && axis.lost <= settings_.tolerated_losses;
-    if (!is_tolerated) axis.measured = controlled.state;
     const auto command = axis.stop.step(controlled.current_A, axis.measured,
                                         is_tolerated ? Fault::none : controlled.fault);
     if (command.is_current_cut) axis.controller.track(command.current_A);
@@ -196,6 +197,7 @@ bool ArmController::sense(std::span<const JointSample> samples) noexcept {
   bool is_complete = !samples.empty();
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     Axis& axis = joints_[j];
+    sense_motor_side(axis, samples.empty() ? JointSample{} : samples[j]);
     if (samples.empty() || !is_finite(samples[j])) {
       axis.lost = std::min(axis.lost + 1, settings_.tolerated_losses + 1);
       axis.speed.skip();
@@ -210,6 +212,21 @@ bool ArmController::sense(std::span<const JointSample> samples) noexcept {
     output_.joints[j].speed_rad_s = speed_rad_s_[j];
   }
   return is_complete;
+}
+
+// For the stop, which can watch the drive even if the link's encoder has failed. Over a tick or two without a
+// sample the last state stays.
+void ArmController::sense_motor_side(Axis& axis, const JointSample& sample) const noexcept {
+  if (std::isfinite(sample.motor_angle_rad)) {
+    const double angle_rad = sample.motor_angle_rad / axis.drive.ratio;
+    axis.measured.angle_rad = angle_rad;
+    axis.measured.speed_rad_s = axis.motor_speed.step(angle_rad);
+  } else {
+    axis.motor_speed.skip();
+    if (axis.lost >= settings_.tolerated_losses) axis.measured = {};
+  }
+  const double spring_Nm = axis.stiffness_Nm_rad * sample.spring_deflection_rad();
+  if (std::isfinite(spring_Nm)) axis.measured.torque_Nm = spring_Nm;
 }
 
 void ArmController::estimate(std::span<const JointSample> samples) noexcept {
@@ -233,6 +250,7 @@ void ArmController::estimate(std::span<const JointSample> samples) noexcept {
     output_.joints[j].torque = torque;
     spring_Nm_[j] = torque.value;
     on_links_Nm[j] = torque.value - bearing_torque(axis, speed_rad_s_[j]);
+    output_.joints[j].link_Nm = on_links_Nm[j];
   }
   (void)observer_.step(dynamics_, angle_rad_, raw_speed_rad_s_, on_links_Nm);
   const auto external_Nm = observer_.external_torque_Nm();

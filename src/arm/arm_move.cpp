@@ -14,6 +14,8 @@ namespace {
 constexpr double kSpeedOfLeastJerk = 15.0 / 8.0;  // the largest values of s', s'' and s'''
 constexpr double kAccelerationOfLeastJerk = 10.0 / std::numbers::sqrt3;
 constexpr double kJerkOfLeastJerk = 60.0;
+/// Controllers keep a margin below the speed limit, which a move must not touch.
+constexpr double kSpeedShare = 0.8;
 
 void check(const JointMoveLimits& limits, std::size_t joint) {
   const auto positive = [&](double value, std::string_view name) {
@@ -37,8 +39,9 @@ double least_time(double distance_rad, const JointMoveLimits& limits) {
 std::vector<JointMoveLimits> move_limits(const ArmModel& arm, double speed_up_s) {
   std::vector<JointMoveLimits> limits;
   for (const ArmJoint& joint : arm.joints) {
-    const double acceleration_rad_s2 = joint.speed_rad_s / speed_up_s;
-    limits.push_back({joint.lowest_rad, joint.highest_rad, joint.speed_rad_s, acceleration_rad_s2,
+    const double speed_rad_s = kSpeedShare * joint.speed_rad_s;
+    const double acceleration_rad_s2 = speed_rad_s / speed_up_s;
+    limits.push_back({joint.lowest_rad, joint.highest_rad, speed_rad_s, acceleration_rad_s2,
                       4.0 * acceleration_rad_s2 / speed_up_s});
   }
   return limits;

@@ -100,8 +100,8 @@ TEST(ArmMove, RefusesWhatCrossesALimitByWaypointAndJoint) {
 TEST(MoveLimits, AreThoseOfTheArm) {
   const auto limits = move_limits(test::arm6());
   EXPECT_EQ(limits.size(), 6U);
-  EXPECT_EQ(limits[2].speed_rad_s, 1.66);
-  EXPECT_EQ(limits[2].acceleration_rad_s2, 3.32);
+  EXPECT_NEAR(limits[2].speed_rad_s, 0.8 * 1.66, 1e-12);
+  EXPECT_NEAR(limits[2].acceleration_rad_s2, 1.6 * 1.66, 1e-12);
 }
 
 }  // namespace

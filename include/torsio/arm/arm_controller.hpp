@@ -84,7 +84,9 @@ class ArmController {
     std::optional<TorqueEstimator> estimator = {};
     /// Replaces the estimator: redundant torques and their monitor, which stops the arm once it watches.
     std::optional<MonitoredTorque> monitored = {};
-    double bearing_Nm = 0.0;           ///< F_b, dry friction between spring and link
+    /// F_b, dry friction between spring and link; 0 if the estimated torque is that after the bearing, as of a model
+    /// that was trained with a load cell at the link.
+    double bearing_Nm = 0.0;
     double viscous_Nms_rad = 0.0;      ///< d
     double largest_external_Nm = 0.0;  ///< above it for `longest_overload_s`: a stop
   };
@@ -112,6 +114,7 @@ class ArmController {
     bool is_powered = true;
     bool is_brake_open = true;
     Estimate torque = {};      ///< torque of the spring
+    double link_Nm = 0.0;      ///< the same less the friction of the bearing: what moves the link
     double wanted_Nm = 0.0;    ///< torque that the links need, friction included
     double external_Nm = 0.0;  ///< external torque, of the observer
     double speed_rad_s = 0.0;  ///< measured, of the link
@@ -171,18 +174,20 @@ class ArmController {
     std::vector<double JointSample::*> monitored_channels;
     Differentiator speed;      ///< speed of the link, filtered
     Differentiator raw_speed;  ///< for the observer
+    Differentiator motor_speed;
     Drive drive;
     double stiffness_Nm_rad;
     double bearing_Nm;
     double viscous_Nms_rad;
     double largest_external_Nm;
     double correction_rad = 0.0;
-    JointState measured = {};  ///< motor side, one tick ago
+    JointState measured = {};  ///< motor side over the ratio, and the linear spring
     std::uint32_t lost = 0;    ///< ticks in a row without a sample
     double overloaded_s = 0.0;
   };
 
   bool sense(std::span<const JointSample> samples) noexcept;
+  void sense_motor_side(Axis& axis, const JointSample& sample) const noexcept;
   void estimate(std::span<const JointSample> samples) noexcept;
   void supervise(std::span<const JointSample> samples) noexcept;
   void find(ArmStopCause cause, std::size_t joint) noexcept;

@@ -19,7 +19,7 @@ struct JointMoveLimits {
   double jerk_rad_s3 = 0.0;
 };
 
-/// @returns the limits of the arm's joints: angles and speeds are its own, and full speed is reached after
+/// @returns the limits of the arm's joints: its angles, 80 % of its speeds, and full speed is reached after
 /// `speed_up_s` at the earliest, full acceleration after a quarter of that
 [[nodiscard]] std::vector<JointMoveLimits> move_limits(const ArmModel& arm,
                                                        double speed_up_s = 0.5);

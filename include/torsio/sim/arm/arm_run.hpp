@@ -1,0 +1,124 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/data/recording.hpp"
+#include "torsio/sim/arm/arm_setup.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
+
+namespace torsio {
+
+/// What an arm does in one step of its program.
+enum class ArmTask : std::uint8_t {
+  move,       ///< to an angle of each joint, by `ArmMove`
+  follow,     ///< a sampled trajectory
+  hold,       ///< the angles at which it is
+  guide,      ///< hand guiding
+  impedance,  ///< a spring and damper at each joint, from where it is
+  cartesian,  ///< springs and dampers at the flange, from where it is
+};
+
+/// A force or torque from outside, for a part of a step.
+struct ArmPush {
+  double start_s = 0.0;  ///< since the step began
+  double duration_s = 0.0;
+  Vector3 force_N = {};                ///< on the flange, in the frame of the base
+  Vector3 moment_Nm = {};              ///< on the flange, in the frame of the base
+  std::vector<double> torque_Nm = {};  ///< on each joint; empty: none
+};
+
+struct ArmStep {
+  ArmTask task = ArmTask::hold;
+  double duration_s = 0.0;                         ///< all but move and follow
+  std::vector<double> to_rad = {};                 ///< move: one angle per joint
+  std::vector<std::vector<double>> path_rad = {};  ///< follow: one angle per joint and tick
+  std::vector<double> stiffness_Nm_rad = {};       ///< impedance: one per joint
+  std::vector<double> damping_Nms_rad = {};        ///< impedance: one per joint
+  std::vector<ArmPush> pushes = {};
+};
+
+/// Plain data: what an arm does, one step after the other.
+struct ArmProgram {
+  std::vector<double> start_rad;
+  std::vector<ArmStep> steps = {};
+  CartesianImpedance::Settings cartesian = {.stiffness = {800.0, 800.0, 800.0, 40.0, 40.0, 40.0}};
+};
+
+/// Reads a program for this arm; docs/robot/arm.md has the format.
+///
+///     start: [0deg, -60deg, 100deg, 0deg, 40deg, 0deg]
+///     program:
+///       - move: [30deg, -40deg, 80deg, 20deg, 50deg, 0deg]
+///       - hold: 1s
+///       - guide: 3s
+///         push: {force: [0N, 20N, 0N], at: 0.5s, for: 1s}
+///       - impedance: 2s
+///         stiffness_Nm_rad: [300, 300, 120, 30, 30, 10]
+///         damping_Nms_rad: [30, 30, 12, 2, 2, 1]
+///       - cartesian: 3s
+///       - follow: trajectory.csv
+///
+/// `follow` takes channels `joint1_angle_rad`, ..., named as the joints of the arm.
+/// @throws Error naming file, line, what was expected and found: an angle beyond the limits, a trajectory that is not
+/// where the step before ended, is faster than a joint may move or crosses its limits (with the line of the file), a
+/// Cartesian step that begins in a singular pose.
+[[nodiscard]] ArmProgram read_arm_program(const std::string& path, const ArmSetup& setup,
+                                          const Progress& progress = {});
+/// Moves through a few poses, hand guiding and a push against the flange: for `arm6_setup`.
+[[nodiscard]] ArmProgram arm6_program();
+
+/// @throws Error as `read_arm_program`, that names the step.
+void require_possible(const ArmProgram& program, const ArmSetup& setup);
+
+struct ArmRunSpec {
+  ArmProgram program;
+  std::vector<FaultSchedule> faults = {};  ///< one per joint; empty: none
+  std::uint64_t seed = 1;
+  bool has_gear_stage = true;  ///< else rotor and gear output turn together: half the cost
+  bool with_truth = false;     ///< also what no sensor measures
+};
+
+/// How one joint did.
+struct ArmJointScore {
+  std::string joint;
+  std::string actuator;
+  std::optional<double> position_rmse_rad =
+      {};                         ///< the link in moves and holds; none: there are none
+  double torque_rmse_Nm = 0.0;    ///< on the link, estimated less true
+  double external_rmse_Nm = 0.0;  ///< external torque, estimated less true
+  double largest_torque_Nm = 0.0;
+  double largest_share = 0.0;  ///< largest torque over the rating
+  double limited_s = 0.0;      ///< how long a limit was in effect
+};
+
+/// What an arm did.
+struct ArmRun {
+  Recording record;                    ///< all joints on one clock: joint1_motor_angle_rad, ...
+  std::vector<Recording> joints = {};  ///< each with the channels of a bench, for `fit` and `check`
+  std::vector<ArmJointScore> scores = {};
+  double duration_s = 0.0;
+  ArmStopCause cause = ArmStopCause::none;
+  std::string stopped_joint = {};        ///< where it was found
+  double stopped_s = 0.0;                ///< when; 0: not stopped
+  std::optional<double> at_rest_s = {};  ///< from the stop until all drives were at rest
+  double largest_drop_m = 0.0;           ///< how far the flange moved after the stop
+
+  /// @returns the name that a channel of a joint has in `record`
+  [[nodiscard]] std::string joint_channel(std::size_t joint, std::string_view channel) const;
+};
+
+/// Runs the program on the simulated arm with its sensors: the brakes are opened first, and a fault ends the run with a
+/// stop. @throws Error if a part refuses its settings, UsageError as `FaultInjector`, Cancelled.
+[[nodiscard]] ArmRun run_arm(const ArmSetup& setup, const ArmRunSpec& spec,
+                             const Progress& progress = {});
+
+/// The enumerators' own spelling.
+[[nodiscard]] std::string_view name(ArmTask task) noexcept;
+
+}  // namespace torsio

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sim/arm/arm_plant.hpp"
+#include "sim/faults/fault_injector.hpp"
+#include "sim/sensors/sensor_set.hpp"
+#include "torsio/estimate/joint_sample.hpp"
+#include "torsio/sim/arm/arm_setup.hpp"
+
+namespace torsio {
+
+inline constexpr double kArmTick_s = 1.0 / kBenchRate_Hz;
+
+/// An arm with its sensors, its brakes and whatever happens to them, tick by tick (`kBenchRate_Hz`).
+///
+/// A brake that has closed clamps its rotor; that it slides while it closes is left out.
+class ArmBench {
+ public:
+  struct Command {
+    double current_A = 0.0;
+    bool is_powered = true;
+    bool is_brake_open = true;
+  };
+
+  /// At rest at these angles, the brakes closed.
+  /// @param faults one schedule per joint, or none
+  /// @throws Error as `ArmPlant` does, UsageError as `FaultInjector`.
+  ArmBench(const ArmSetup& setup, FirstStageForm form, std::span<const FaultSchedule> faults,
+           std::uint64_t seed, std::span<const double> start_rad);
+
+  /// The signals of all joints at this tick, including faults.
+  void sense();
+  [[nodiscard]] const Measurement& measured(std::size_t joint) const {
+    return joints_[joint].measured;
+  }
+  [[nodiscard]] std::span<const JointSample> samples() const noexcept { return samples_; }
+  /// Faults begin to count from here.
+  void start_clock() noexcept { tick_ = 0; }
+  /// Advances to the next tick. @throws Error if the arm refuses.
+  void act(std::span<const Command> commands, const ArmLoad& load);
+
+  [[nodiscard]] const ArmPlant& plant() const noexcept { return plant_; }
+  [[nodiscard]] double time_s() const noexcept {
+    return static_cast<double>(tick_) / kBenchRate_Hz;
+  }
+
+ private:
+  struct Joint {
+    Joint(const DataSheet& sheet, const FaultSchedule& schedule, std::uint64_t seed);
+
+    SensorSet sensors;
+    FaultInjector faults;
+    bool has_faults;
+    double engage_s;
+    double release_s;
+    double since_s = 1e9;  ///< since the brake's command changed
+    bool is_open = false;  ///< the brake's command
+    bool is_held = true;   ///< the rotor, by the brake
+    Measurement measured = {};
+  };
+
+  [[nodiscard]] SensedPlant sensed(std::size_t joint) const noexcept;
+
+  ArmPlant plant_;
+  std::vector<Joint> joints_;
+  std::vector<JointSample> samples_;
+  std::vector<PlantCommand> commands_;
+  std::size_t tick_ = 0;
+};
+
+}  // namespace torsio

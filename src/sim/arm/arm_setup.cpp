@@ -1,0 +1,248 @@
+#include "torsio/sim/arm/arm_setup.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <string_view>
+
+#include "data/names.hpp"
+#include "data/yaml_reader.hpp"
+#include "sim/plant/plant.hpp"
+#include "sim/sensors/sensor_set.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
+#include "torsio/arm/urdf.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/files/monitor_file.hpp"
+#include "torsio/sim/bench/sheet_file.hpp"
+
+namespace torsio {
+namespace {
+
+/// The arm that comes with torsio.
+constexpr std::string_view kArm6Yaml =
+#include "arm6_yaml.inc"
+    ;
+constexpr std::string_view kArm6Urdf =
+#include "arm6_urdf.inc"
+    ;
+
+constexpr std::uint64_t kPoseSeed = 1;
+constexpr int kPoses = 2000;
+constexpr double kSlowestSpeedUp_s = 60.0;
+constexpr double kLargest = 1e6;
+
+/// Shares of the torque at rated current: what the spring may carry, and what no sensor measures.
+constexpr double kMeasuredShare = kLargestStaticShare;
+constexpr double kUnmeasuredShare = 0.05;
+/// Fast, so that dry friction makes little difference to the speed at a limit.
+constexpr double kOverride_rad_s = 100.0;
+/// An external torque above this share of the rating is not a hand.
+constexpr double kOverloadShare = 1.0;
+
+using ReadText = std::function<std::string(const std::string&)>;
+
+std::vector<double> numbers(const YamlValue& list, std::size_t count, std::string_view unit) {
+  std::vector<double> values;
+  for (const YamlValue& item : list.items())
+    values.push_back(unit.empty() ? item.plain_number(kLargest) : item.number(unit));
+  if (values.size() != count) list.refuse(fmt::format("a list of {} numbers", count));
+  return values;
+}
+
+BodyInertia payload_of(const YamlValue& yaml) {
+  yaml.allow_only({"mass", "center_of_mass", "inertia_kg_m2"});
+  BodyInertia payload;
+  payload.mass_kg = yaml.at("mass").number("kg");
+  if (!(payload.mass_kg >= 0.0)) yaml.at("mass").refuse("a mass of 0 kg or more");
+  if (const auto com = yaml.find("center_of_mass"))
+    std::ranges::copy(numbers(*com, 3, "m"), payload.com_m.begin());
+  if (const auto inertia = yaml.find("inertia_kg_m2")) {
+    const std::size_t count = inertia->items().size() == 6 ? 6 : 3;
+    std::ranges::copy(numbers(*inertia, count, ""), payload.inertia_kg_m2.begin());
+  }
+  if (!is_possible_payload(payload))
+    yaml.refuse("an inertia xx, yy, zz (and xy, xz, yz) that a body can have");
+  return payload;
+}
+
+ArmJointSetup joint_of(const YamlValue& yaml, const std::filesystem::path& folder,
+                       const Progress& progress) {
+  yaml.allow_only({"actuator", "model", "monitor"});
+  const YamlValue actuator = yaml.at("actuator");
+  const auto beside = [&](const std::string& file) {
+    return file.empty() ? file : (folder / file).string();
+  };
+  std::string name = actuator.text();
+  if (is_sheet_file(name)) name = beside(name);
+  ArmJointSetup joint{.sheet = find_data_sheet(name, progress)};
+  if (joint.sheet.family != ActuatorFamily::series_elastic)
+    actuator.refuse("a series-elastic actuator: dfki-28, dfki-50, dfki-120 or dfki-300");
+  if (const auto model = yaml.find("model")) joint.model = beside(model->text());
+  if (const auto monitor = yaml.find("monitor")) joint.monitor = beside(monitor->text());
+  return joint;
+}
+
+void take_joints(ArmSetup& setup, const YamlValue& yaml, const std::filesystem::path& folder,
+                 const Progress& progress) {
+  std::vector<std::string> names;
+  for (const ArmJoint& joint : setup.arm.joints) names.push_back(joint.name);
+  yaml.allow_only(std::span<const std::string>(names));
+  for (const std::string& name : names) {
+    const auto joint = yaml.find(name);
+    if (!joint)
+      yaml.refuse(
+          fmt::format("an actuator for joint '{}' of the arm", name),
+          fmt::format("Add '{}: {{actuator: dfki-28}}', or make the joint fixed in the URDF.",
+                      name));
+    setup.joints.push_back(joint_of(*joint, folder, progress));
+  }
+}
+
+ArmSetup parse(const YamlValue& yaml, const std::filesystem::path& folder, const ReadText& read,
+               const Progress& progress) {
+  yaml.allow_only({"urdf", "base_tilt", "payload", "speed_up", "joints"});
+  const YamlValue urdf = yaml.at("urdf");
+  const std::string file = (folder / urdf.text()).string();
+  ArmSetup setup{.arm = read_urdf(read(file), file)};
+  if (const auto tilt = yaml.find("base_tilt"))
+    setup.arm.gravity_m_s2 = tilted_gravity(tilt->number("rad"));
+  if (const auto payload = yaml.find("payload")) setup.arm.payload = payload_of(*payload);
+  double speed_up_s = 0.5;
+  if (const auto given = yaml.find("speed_up")) {
+    speed_up_s = given->positive_number("s");
+    if (speed_up_s > kSlowestSpeedUp_s) given->refuse("a time of at most 60 s");
+  }
+  setup.moves = move_limits(setup.arm, speed_up_s);
+  take_joints(setup, yaml.at("joints"), folder, progress);
+  require_carriable(setup, yaml.find("payload").value_or(yaml).place());
+  return setup;
+}
+
+std::string text_of_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  if (!in && text.empty())
+    throw Error({.place = path,
+                 .problem = "cannot be read",
+                 .advice = "The path in 'urdf' is relative to the file of the arm."});
+  return text;
+}
+
+JointControllerCore::Settings control_of(const ArmJoint& joint, const DataSheet& sheet,
+                                         double joint_inertia_kg_m2) {
+  SeriesElasticJoint elastic = series_elastic_joint(sheet);
+  elastic.joint_inertia_kg_m2 = joint_inertia_kg_m2;
+  const Drive& drive = elastic.drive;
+  const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
+  const double wound_rad = sheet.rating.torque_Nm.value / elastic.stiffness_Nm_rad;
+  return {.torque = {.deflection = {.joint = elastic},
+                     .largest_torque_Nm = sheet.rating.torque_Nm.value},
+          .limits = {.lowest_rad = joint.lowest_rad - wound_rad,
+                     .highest_rad = joint.highest_rad + wound_rad,
+                     .speed_rad_s = sheet.rating.speed_rad_s.value,
+                     .max_unmeasured_load_Nm = kUnmeasuredShare * rated_Nm,
+                     .max_measured_load_Nm = kMeasuredShare * rated_Nm},
+          .override_rad_s = kOverride_rad_s,
+          .gains = JointCascade::gains_for(drive, kOverride_rad_s)};
+}
+
+JointStop::Settings stop_of(const DataSheet& sheet, double load_Nm) {
+  const BrakeSheet brake = brake_sheet(sheet);
+  const double static_Nm = brake.static_torque_Nm.value;
+  return {.drive = drive_of(sheet),
+          .speed_rad_s = sheet.rating.speed_rad_s.value,
+          .deceleration_rad_s2 = 2.0 * sheet.rating.speed_rad_s.value,
+          .brake_static_Nm = static_Nm,
+          .brake_sliding_Nm = brake.sliding_ratio.value * static_Nm,
+          .brake_engage_s = brake.engage_s.value,
+          .brake_release_s = brake.release_s.value,
+          .load_Nm = load_Nm};
+}
+
+}  // namespace
+
+ArmSetup read_arm(const std::string& path, const Progress& progress) {
+  return parse(YamlValue::read(path, progress), std::filesystem::path(path).parent_path(),
+               text_of_file, progress);
+}
+
+ArmSetup arm6_setup() {
+  return parse(YamlValue::parse(kArm6Yaml, "arm6.yaml"), {},
+               [](const std::string&) { return std::string(kArm6Urdf); }, {});
+}
+
+void require_carriable(const ArmSetup& setup, const std::string& place) {
+  const std::vector<double> needed_Nm = largest_gravity_torques(setup.arm);
+  for (std::size_t j = 0; j < needed_Nm.size(); ++j) {
+    const double rated_Nm = setup.joints[j].sheet.rating.torque_Nm.value;
+    if (needed_Nm[j] <= kLargestStaticShare * rated_Nm) continue;
+    throw Error({.place = place,
+                 .problem = fmt::format("the payload is beyond the rating of joint '{}'",
+                                        setup.arm.joints[j].name),
+                 .expected = fmt::format("a weight of arm and payload that needs at most {:g} % of "
+                                         "the rated {:.4g} Nm in any pose",
+                                         100.0 * kLargestStaticShare, rated_Nm),
+                 .found = fmt::format("{:.4g} Nm", needed_Nm[j]),
+                 .advice = "Reduce the payload or the limits of the joints in the URDF, or take a "
+                           "stronger actuator."});
+  }
+}
+
+std::vector<double> largest_gravity_torques(const ArmModel& arm) {
+  const ArmDynamics dynamics(arm);
+  const std::size_t count = arm.joints.size();
+  std::vector<double> largest_Nm(count, 0.0);
+  Random random(kPoseSeed);
+  ArmDynamics::PerJoint angle_rad = {};
+  ArmDynamics::PerJoint torque_Nm = {};
+  for (int pose = 0; pose < kPoses; ++pose) {
+    for (std::size_t j = 0; j < count; ++j)
+      angle_rad[j] = random.uniform(arm.joints[j].lowest_rad, arm.joints[j].highest_rad);
+    dynamics.gravity_torque(angle_rad, torque_Nm);
+    for (std::size_t j = 0; j < count; ++j)
+      largest_Nm[j] = std::max(largest_Nm[j], std::abs(torque_Nm[j]));
+  }
+  return largest_Nm;
+}
+
+ArmController::Settings arm_controller_settings(
+    const ArmSetup& setup, const std::optional<CartesianImpedance::Settings>& cartesian) {
+  ArmController::Settings settings{.arm = setup.arm, .cartesian = cartesian};
+  const std::vector<double> weight_Nm = largest_gravity_torques(setup.arm);
+  for (std::size_t j = 0; j < setup.joints.size(); ++j) {
+    const ArmJointSetup& from = setup.joints[j];
+    const DataSheet& sheet = from.sheet;
+    ArmController::Joint joint{
+        .control = control_of(setup.arm.joints[j], sheet, sheet.joint.inertia_kg_m2.value),
+        .stop = stop_of(sheet, weight_Nm[j]),
+        .bearing_Nm = sheet.joint.bearing_friction_Nm.value,
+        .viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value,
+        .largest_external_Nm = kOverloadShare * sheet.rating.torque_Nm.value};
+    joint.inverse = LinearInverse(joint.control.torque.deflection.joint.stiffness_Nm_rad);
+    if (!from.model.empty()) {
+      const ModelFile model = load_model(from.model);
+      joint.estimator.emplace(make_estimator(model, kBenchRate_Hz));
+      joint.inverse = AnyInverse::of(model.settings, model.parameters);
+    }
+    // A load cell is after the bearing: a model of its torque contains the friction of the bearing.
+    if (!from.model.empty() || !from.monitor.empty())
+      joint.bearing_Nm = joint.viscous_Nms_rad = 0.0;
+    if (!from.monitor.empty())
+      joint.monitored.emplace(load_monitor(from.monitor, {.rate_Hz = kBenchRate_Hz}));
+    settings.joints.push_back(std::move(joint));
+  }
+  return settings;
+}
+
+}  // namespace torsio
