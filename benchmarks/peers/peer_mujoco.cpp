@@ -72,7 +72,7 @@ int main(int argc, char** argv) try {
   mjData* const data = mj_makeData(model);
   const auto motors = static_cast<std::size_t>(model->nu);
   double best = 1e300;
-  for (int run = 0; run < 20; ++run) {
+  for (int run = 0; run < 60; ++run) {
     if (is_arm) mj_resetData(model, data);
     const auto begin = std::chrono::steady_clock::now();
     for (std::size_t at = 0; at < commands.size(); at += motors) {
