@@ -14,7 +14,7 @@ Study slow_loops_002(const StudyOptions& options, const Progress& progress);
 Study collision_002(const StudyOptions& options, const Progress& progress);
 Study coupling_003(const StudyOptions& options, const Progress& progress);
 Study models_003(const StudyOptions& options, const Progress& progress);
-Study redundancy_000(const StudyOptions& options, const Progress& progress);
+Study arm_000(const StudyOptions& options, const Progress& progress);
 Study transfer_000(const StudyOptions& options, const Progress& progress);
 Study brake_000(const StudyOptions& options, const Progress& progress);
 Study torque_tracking_000(const StudyOptions& options, const Progress& progress);

@@ -3,11 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <variant>
 
-#include "studies/arm_bench.hpp"
+#include "studies/arm_trajectory.hpp"
 #include "studies/study.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
@@ -17,64 +16,42 @@
 namespace torsio {
 namespace {
 
-constexpr double kGravity_m_s2 = 9.81;
-
-/// Potential energy of the arm, its lowest position being 0 plus a constant.
-double potential_J(const ArmAngles& angles_rad) {
-  double height_m = 0.0;
-  double absolute_rad = 0.0;
-  double energy_J = 0.0;
-  for (std::size_t j = 0; j < kArmJoints; ++j) {
-    absolute_rad += angles_rad[j];
-    const double rise_m = -kArm[j].length_m * std::cos(absolute_rad);
-    energy_J += kGravity_m_s2 * (kArm[j].link_kg * (height_m + 0.5 * rise_m) +
-                                 kArm[j].tip_kg * (height_m + rise_m));
-    height_m += rise_m;
-  }
-  return energy_J;
+TEST(ArmConfigurations, AreWithinTheLimitsAndMoveEveryJoint) {
+  const ArmSetup setup = arm6_setup();
+  const auto configurations = arm_configurations(20, 5);
+  ASSERT_EQ(configurations.size(), 21U);
+  EXPECT_EQ(configurations, arm_configurations(20, 5));
+  for (std::size_t k = 0; k < configurations.size(); ++k)
+    for (std::size_t j = 0; j < setup.moves.size(); ++j) {
+      EXPECT_GE(configurations[k][j], setup.moves[j].lowest_rad);
+      EXPECT_LE(configurations[k][j], setup.moves[j].highest_rad);
+    }
+  for (std::size_t k = 1; k < configurations.size(); ++k)
+    for (const ArmPart& part : kArm)
+      EXPECT_GT(std::abs(configurations[k][part.index] - configurations[k - 1][part.index]), 0.39);
 }
 
-TEST(Arm, IsPulledByTheGradientOfItsPotentialEnergy) {
-  const ArmAngles angles_rad{2.3, -0.7, 1.1};
-  const ArmAngles torques_Nm = arm_gravity_torques(angles_rad);
-  for (std::size_t j = 0; j < kArmJoints; ++j) {
-    constexpr double kStep_rad = 1e-5;
-    ArmAngles above = angles_rad;
-    ArmAngles below = angles_rad;
-    above[j] += kStep_rad;
-    below[j] -= kStep_rad;
-    EXPECT_NEAR(torques_Nm[j], -(potential_J(above) - potential_J(below)) / (2.0 * kStep_rad), 1e-6)
-        << kArm[j].joint;
-  }
-}
-
-TEST(Arm, LoadsEachJointWithinItsRating) {
-  const ArmAngles stretched_Nm = arm_gravity_torques({std::numbers::pi / 2.0, 0.0, 0.0});
-  const ArmAngles inertias_kg_m2 = arm_inertias();
-  for (std::size_t j = 0; j < kArmJoints; ++j) {
-    const double rated_Nm = data_sheet(kArm[j].actuator).rating.torque_Nm.value;
-    EXPECT_LT(std::abs(stretched_Nm[j]), rated_Nm) << kArm[j].joint;
-    EXPECT_GT(std::abs(stretched_Nm[j]), 0.3 * rated_Nm) << kArm[j].joint;
-    EXPECT_GT(inertias_kg_m2[j], 0.0);
-  }
+TEST(ArmConfigurations, AreOfTheJointsOfTheTable) {
+  const ArmSetup setup = arm6_setup();
+  for (const ArmPart& part : kArm) EXPECT_EQ(setup.joints[part.index].sheet.name, part.actuator);
 }
 
 /// The study, run once.
-const Study& redundancy() {
+const Study& arm_study() {
   static const Study study =
-      run_study(find_study("000-redundancy"), {.seed = 3, .repeats = 1, .is_quick = true});
+      run_study(find_study("000-arm"), {.seed = 3, .repeats = 1, .is_quick = true});
   return study;
 }
 
 const QuantityRow& row(const std::string& joint, const std::string& quantity) {
-  const auto& rows = std::get<QuantityTable>(redundancy().table).rows;
+  const auto& rows = std::get<QuantityTable>(arm_study().table).rows;
   const auto found = std::ranges::find_if(
       rows, [&](const auto& of) { return of.condition == joint && of.quantity == quantity; });
   if (found == rows.end()) throw Error({.problem = joint + " " + quantity});
   return *found;
 }
 
-TEST(RedundancyStudy, ShowsTheFigureOfTheFileBesideEachCoefficient) {
+TEST(ArmStudy, ShowsTheFigureOfTheFileBesideEachCoefficient) {
   const auto joints =
       read_torque_coefficients(std::string(TORSIO_SOURCE) + "/studies/paper_000_table_3.yaml");
   const auto text = [](const std::string& joint, const char* quantity) {
@@ -96,7 +73,7 @@ TEST(RedundancyStudy, ShowsTheFigureOfTheFileBesideEachCoefficient) {
   }
 }
 
-TEST(RedundancyStudy, HasTheSignsOfThePaperAndTheStiffnessOfItsSprings) {
+TEST(ArmStudy, HasTheSignsOfThePaperAndTheStiffnessOfItsSprings) {
   for (const ArmPart& part : kArm) {
     const std::string joint(part.joint);
     EXPECT_LT(row(joint, "p1 gear").value, 0.0) << joint;
@@ -109,7 +86,7 @@ TEST(RedundancyStudy, HasTheSignsOfThePaperAndTheStiffnessOfItsSprings) {
   EXPECT_NEAR(row("joint 4 (28 Nm)", "p1 spring").value, -5.6, 0.6);
 }
 
-TEST(RedundancyStudy, FindsTheLoadInTheDeflectionAloneAndTheMotorTorqueInTheSum) {
+TEST(ArmStudy, FindsTheLoadInTheDeflectionAloneAndTheMotorTorqueInTheSum) {
   for (const ArmPart& part : kArm) {
     const std::string joint(part.joint);
     const double sum_Nm = row(joint, "RMSE of (19) spring to load cell").value;
@@ -128,11 +105,11 @@ TEST(RedundancyStudy, FindsTheLoadInTheDeflectionAloneAndTheMotorTorqueInTheSum)
         << joint;
 }
 
-TEST(RedundancyStudy, DrawsPositionSpeedAndTorquesOfEachJoint) {
-  EXPECT_TRUE(find_study("000-redundancy").has_figures);
-  const std::vector<ReportFigure>& figures = redundancy().figures;
-  ASSERT_EQ(figures.size(), 3 * kArmJoints);
-  EXPECT_EQ(redundancy().figure_columns, 3U);
+TEST(ArmStudy, DrawsPositionSpeedAndTorquesOfEachJoint) {
+  EXPECT_TRUE(find_study("000-arm").has_figures);
+  const std::vector<ReportFigure>& figures = arm_study().figures;
+  ASSERT_EQ(figures.size(), 3 * kArmJoints + 2);  // and the arm from two sides
+  EXPECT_EQ(arm_study().figure_columns, 3U);
   for (std::size_t j = 0; j < kArmJoints; ++j) {
     const auto& position = std::get<XyFigure>(figures[3 * j]);
     const auto& speed = std::get<XyFigure>(figures[3 * j + 1]);

@@ -15,7 +15,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
-#include "torsio/report/html/arm_report.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/sim/arm/arm_run.hpp"
 #include "torsio/sim/arm/arm_setup.hpp"

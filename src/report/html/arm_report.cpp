@@ -1,14 +1,14 @@
-#include "torsio/report/html/arm_report.hpp"
-
 #include <fmt/format.h>
 
 #include <array>
 #include <cstddef>
 #include <utility>
 
+#include "report/html/arm_figures.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio {
 namespace {

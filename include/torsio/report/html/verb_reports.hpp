@@ -19,6 +19,8 @@
 #include "torsio/evaluate/transfer_curve.hpp"
 #include "torsio/report/attribution.hpp"
 #include "torsio/report/document/report_document.hpp"
+#include "torsio/sim/arm/arm_run.hpp"
+#include "torsio/sim/arm/arm_setup.hpp"
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
 
@@ -71,6 +73,11 @@ namespace torsio {
 
 /// Wanted, linear and rendered impedance as Bode and Nyquist diagrams, and the motion of the hand.
 [[nodiscard]] ReportDocument impedance_report(const ImpedanceRun& run);
+
+/// Scores of the joints, the arm drawn from the side and from above in poses of the run, torques of all joints.
+/// @param summary sentences
+[[nodiscard]] ReportDocument arm_report(const ArmSetup& setup, const ArmRun& run,
+                                        std::vector<std::string> summary);
 
 /// A page with the text of a verb and its figures.
 [[nodiscard]] ReportDocument text_report(std::string title, std::vector<std::string> summary,

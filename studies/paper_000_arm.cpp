@@ -10,10 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "arm_bench.hpp"
+#include "arm_trajectory.hpp"
 #include "core/running_mean.hpp"
 #include "numerics/metrics_accumulator.hpp"
 #include "paper_figures.hpp"
+#include "report/html/arm_figures.hpp"
 #include "sim/plant/plant.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
@@ -31,6 +32,7 @@ constexpr std::size_t kQuickSegments = 10;
 constexpr std::uint64_t kTest = 50;  // distance of the seeds of test trajectories
 constexpr double kShown_s = 40.0;    // in the figure
 constexpr double kShownBin_s = 0.1;
+constexpr std::size_t kShownConfigurations = 6;
 
 /// A coefficient of (18) or (19) in the paper's unit.
 struct Coefficient {
@@ -244,12 +246,25 @@ void draw(std::vector<ReportFigure>& figures, std::string_view joint, const Join
 
 }  // namespace
 
-Study redundancy_000(const StudyOptions& options, const Progress& progress) {
+/// Figure 13: the configurations of one trajectory, drawn as the arm in each of them.
+void draw_configurations(std::vector<ReportFigure>& figures,
+                         const std::vector<std::vector<double>>& configurations) {
+  const std::size_t count = std::min(configurations.size(), kShownConfigurations);
+  std::vector<std::string> labels;
+  for (std::size_t k = 0; k < count; ++k) labels.push_back(fmt::format("configuration {}", k + 1));
+  const std::vector<std::vector<double>> shown_rad(
+      configurations.begin(), configurations.begin() + static_cast<std::ptrdiff_t>(count));
+  for (ReportFigure& figure : arm_figures(arm6_setup().arm, shown_rad, labels))
+    figures.push_back(std::move(figure));
+}
+
+Study arm_000(const StudyOptions& options, const Progress& progress) {
   Study study{
       .protocol =
-          "joints 2 to 4 of an arm move along quintic segments between random configurations, the "
-          "fastest at up to 25 deg/s, under gravity; masses and lengths of the arm are assumed. "
-          "(16) is fitted to one trajectory per repeat; the RMSE are those of another",
+          "an arm of six elastic joints with a payload of 8 kg moves between random "
+          "configurations, "
+          "its joints at up to 25 deg/s, under its controller; masses and lengths of the arm are "
+          "assumed. (16) is fitted to one trajectory per repeat; the RMSE are those of another",
       .unit = "Nm",
       .options = options};
   std::vector<JointMeans> means;
@@ -262,9 +277,10 @@ Study redundancy_000(const StudyOptions& options, const Progress& progress) {
   const std::size_t segments = options.is_quick ? kQuickSegments : kSegments;
   for (std::size_t k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = repeat_seed(options, k);
-    const auto training =
-        record_arm(segments, seed, nth_of(progress, 2 * k, 2 * options.repeats, "fit"));
-    const auto test = record_arm(segments, seed + kTest,
+    const auto training = record_arm(arm_configurations(segments, seed), seed,
+                                     nth_of(progress, 2 * k, 2 * options.repeats, "fit"));
+    const auto configurations = arm_configurations(segments, seed + kTest);
+    const auto test = record_arm(configurations, seed + kTest,
                                  nth_of(progress, 2 * k + 1, 2 * options.repeats, "test"));
     for (std::size_t j = 0; j < kArmJoints; ++j) {
       const auto parameters = means[j].add(training[j], test[j], seed);
@@ -272,6 +288,7 @@ Study redundancy_000(const StudyOptions& options, const Progress& progress) {
         draw(study.figures, kArm[j].joint, log_of(test[j], parameters), test[j].sample_rate_Hz());
     }
   }
+  draw_configurations(study.figures, arm_configurations(segments, repeat_seed(options, 0) + kTest));
   QuantityTable table;
   for (const JointMeans& of : means) of.write(table.rows);
   study.table = std::move(table);
@@ -285,6 +302,10 @@ Study redundancy_000(const StudyOptions& options, const Progress& progress) {
       "The Coulomb friction of the plants follows from the printed p3 of the spring, their gear "
       "stiffness (300 and 120 Nm) from the printed p1 of the gear; the viscous friction is "
       "assumed.");
+  study.notes.emplace_back(
+      "The poses of Figure 13 are not printed: those drawn here are the first configurations of "
+      "the "
+      "test trajectory, our own.");
   study.notes.emplace_back("Condition numbers are those of (16) in the paper's units.");
   return study;
 }
