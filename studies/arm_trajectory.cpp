@@ -22,7 +22,7 @@ constexpr double kJerk_rad_s3 = rad_from_deg(300.0);
 // Configurations: the upper arm on both sides of upright, the elbow on both sides of straight; the last link is bent, so
 // that the payload loads joint 4, which turns the forearm about its own axis.
 constexpr std::array kMiddle_deg{0.0, -90.0, 0.0, 0.0, 75.0, 0.0};
-constexpr std::array kHalfRange_deg{60.0, 80.0, 110.0, 100.0, 15.0, 90.0};
+constexpr std::array kHalfRange_deg{60.0, 65.0, 110.0, 100.0, 15.0, 90.0};
 
 constexpr double kShortest_rad = rad_from_deg(45.0);
 constexpr double kShortestShare = 0.5;

@@ -82,6 +82,8 @@ ArmController::ArmController(Settings settings, double sample_rate_Hz)
   require_parameter(settings_.friction_share >= 0.0 && settings_.friction_share <= 1.0, kPlace,
                     "a share of friction from 0 to 1", settings_.friction_share);
   require_not_negative(kPlace, "the correction of the links", settings_.link_correction_1_s);
+  require_not_negative(kPlace, "the damping of the links", settings_.link_damping);
+  require_positive(kPlace, "the fastest swing", settings_.fastest_swing_rad_s);
   require_not_negative(kPlace, "the largest correction", settings_.largest_correction_rad);
   require_positive(kPlace, "the longest overload", settings_.longest_overload_s);
   if (settings_.cartesian) cartesian_.emplace(*settings_.cartesian);
@@ -347,6 +349,9 @@ void ArmController::follow_position(const ArmReference& reference) noexcept {
   ArmDynamics::PerJoint torque_Nm = {};
   dynamics_.inverse(reference.position_rad, reference.velocity_rad_s, reference.acceleration_rad_s2,
                     torque_Nm);
+  ArmDynamics::PerJoint damping_s = {};
+  ArmDynamics::PerJoint acceleration_rad_s2 = {};
+  find_swing(damping_s, acceleration_rad_s2);
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     Axis& axis = joints_[j];
     const double speed_rad_s = reference.velocity_rad_s[j];
@@ -359,13 +364,32 @@ void ArmController::follow_position(const ArmReference& reference) noexcept {
                                              (reference.position_rad[j] - angle_rad_[j]),
                    -settings_.largest_correction_rad, settings_.largest_correction_rad);
     output_.joints[j].wanted_Nm = spring_Nm;
-    references_[j] = {.mode = JointMode::position,
-                      .position_rad = reference.position_rad[j] +
-                                      spring_Nm / axis.stiffness_Nm_rad + axis.correction_rad,
-                      .velocity_rad_s = speed_rad_s,
-                      .acceleration_rad_s2 = reference.acceleration_rad_s2[j],
-                      .torque_Nm = spring_Nm + settings_.friction_share * drive_Nm};
+    references_[j] = {
+        .mode = JointMode::position,
+        .position_rad = reference.position_rad[j] + spring_Nm / axis.stiffness_Nm_rad +
+                        axis.correction_rad + damping_s[j] * (speed_rad_s - speed_rad_s_[j]),
+        .velocity_rad_s = speed_rad_s + damping_s[j] * (reference.acceleration_rad_s2[j] -
+                                                        acceleration_rad_s2[j]),
+        .acceleration_rad_s2 = reference.acceleration_rad_s2[j],
+        .torque_Nm = spring_Nm + settings_.friction_share * drive_Nm};
   }
+}
+
+// T and q̈ of the links as they are.
+void ArmController::find_swing(ArmDynamics::PerJoint& damping_s,
+                               ArmDynamics::PerJoint& acceleration_rad_s2) const noexcept {
+  const std::size_t n = joints_.size();
+  ArmDynamics::JointMatrix mass_kg_m2;
+  ArmDynamics::PerJoint bias_Nm = {};
+  dynamics_.equation(angle_rad_, speed_rad_s_, mass_kg_m2, bias_Nm);
+  for (std::size_t j = 0; j < n; ++j) {
+    const double swing_rad_s = std::sqrt(joints_[j].stiffness_Nm_rad / mass_kg_m2[j * n + j]);
+    const double ratio = swing_rad_s / settings_.fastest_swing_rad_s;
+    damping_s[j] =
+        2.0 * settings_.link_damping / swing_rad_s / (1.0 + ratio * ratio * ratio * ratio);
+    acceleration_rad_s2[j] = output_.joints[j].link_Nm + output_.joints[j].external_Nm - bias_Nm[j];
+  }
+  solve_positive(std::span(mass_kg_m2).first(n * n), std::span(acceleration_rad_s2).first(n));
 }
 
 std::string_view name(ArmMode mode) noexcept {

@@ -61,8 +61,9 @@ enum class ArmStopCause : std::uint8_t {
 /// With τ_b(q̇) = F_b tanh(q̇ / v₀) + d q̇, the friction of the bearings between springs and links:
 ///
 ///     position    τ* = M(q*) q̈* + c(q*, q̇*) + g(q*) + τ_b(q̇*) + F_c tanh(q̇* / v₀) + F_v q̇*, fed forward in the
-///                 position mode of the joint, which follows the motor side: θ* = q* + τ_s / K + k ∫ (q* − q) dt, τ_s the
-///                 part of τ* that the spring carries
+///                 position mode of the joint, which follows the motor side:
+///                 θ* = q* + τ_s / K + k ∫ (q* − q) dt + T (q̇* − q̇),   θ̇* = q̇* + T (q̈* − q̈)
+///                 τ_s the part of τ* that the spring carries, q̈ that of the links under the estimated torques
 ///     impedance   τ_ff = g(q) + τ_b(q̇), in the impedance mode of the joint
 ///     cartesian   τ* = `CartesianImpedance` + s τ_b(q̇), in its torque mode
 ///     guiding     τ* = c(q, q̇) + g(q) + s τ_b(q̇), in its torque mode
@@ -93,10 +94,14 @@ class ArmController {
   struct Settings {
     ArmModel arm = {};
     std::vector<Joint> joints = {};
-    double speed_cutoff_Hz = 60.0;         ///< low-pass of the measured speed of the links
-    double friction_speed_rad_s = 0.02;    ///< v₀
-    double friction_share = 0.7;           ///< s
-    double link_correction_1_s = 2.0;      ///< k; 0: none
+    double speed_cutoff_Hz = 60.0;       ///< low-pass of the measured speed of the links
+    double friction_speed_rad_s = 0.02;  ///< v₀
+    double friction_share = 0.7;         ///< s
+    double link_correction_1_s = 0.5;    ///< k; 0: none
+    /// ζ, damps a link that swings on its spring with ω = √(K / M_ii): T = 2 ζ / ω, fading out where ω is faster than
+    /// `fastest_swing_rad_s`, which the motor side does not follow. An integral without it would destabilise the swing.
+    double link_damping = 0.3;
+    double fastest_swing_rad_s = 25.0;
     double largest_correction_rad = 0.05;  ///< limit of the integral k ∫ (q* − q) dt
     /// The position mode does not begin farther from the measured angles than this: the reference is refused.
     double largest_start_error_rad = 0.05;
@@ -196,6 +201,8 @@ class ArmController {
   void hold() noexcept;
   void references(const ArmReference& reference) noexcept;
   void follow_position(const ArmReference& reference) noexcept;
+  void find_swing(ArmDynamics::PerJoint& damping_s,
+                  ArmDynamics::PerJoint& acceleration_rad_s2) const noexcept;
   [[nodiscard]] double bearing_torque(const Axis& axis, double speed_rad_s) const noexcept;
 
   Settings settings_;  ///< without the joints, which are in `joints_`
