@@ -14,6 +14,7 @@ namespace torsio {
 namespace {
 
 constexpr auto kPlace = "arm controller";
+constexpr double kGuidingWidth_rad = 0.01;  // width of the friction that holds a guided arm
 
 bool is_finite(const ArmDynamics::PerJoint& values) noexcept {
   return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
@@ -60,7 +61,9 @@ ArmController::Axis::Axis(Joint&& from, double sample_rate_Hz, double speed_cuto
       stiffness_Nm_rad(from.control.torque.deflection.joint.stiffness_Nm_rad),
       bearing_Nm(from.bearing_Nm),
       viscous_Nms_rad(from.viscous_Nms_rad),
-      largest_external_Nm(from.largest_external_Nm) {
+      largest_external_Nm(from.largest_external_Nm),
+      guiding_friction_Nm(from.guiding_friction_Nm) {
+  require_not_negative(kPlace, "the friction of hand guiding", guiding_friction_Nm);
   require_not_negative(kPlace, "the friction of the bearing", bearing_Nm);
   require_not_negative(kPlace, "the viscous friction of the bearing", viscous_Nms_rad);
   require_positive(kPlace, "the largest external torque", largest_external_Nm);
@@ -84,6 +87,7 @@ ArmController::ArmController(Settings settings, double sample_rate_Hz)
   require_not_negative(kPlace, "the correction of the links", settings_.link_correction_1_s);
   require_not_negative(kPlace, "the damping of the links", settings_.link_damping);
   require_positive(kPlace, "the fastest swing", settings_.fastest_swing_rad_s);
+  require_positive(kPlace, "the decay of a guided motion", settings_.guiding_decay_s);
   require_not_negative(kPlace, "the largest correction", settings_.largest_correction_rad);
   require_positive(kPlace, "the longest overload", settings_.longest_overload_s);
   if (settings_.cartesian) cartesian_.emplace(*settings_.cartesian);
@@ -306,7 +310,7 @@ void ArmController::references(const ArmReference& reference) noexcept {
   output_.manipulability = 1.0;
   output_.is_singular = false;
   ArmDynamics::PerJoint torque_Nm = {};
-  ArmDynamics::JointMatrix mass_kg_m2;
+  is_guided_ = is_guided_ && reference.mode == ArmMode::guiding;
   switch (reference.mode) {
     case ArmMode::joints:
       std::ranges::copy_n(reference.joints.begin(), static_cast<std::ptrdiff_t>(joints_.size()),
@@ -325,9 +329,7 @@ void ArmController::references(const ArmReference& reference) noexcept {
       output_.is_singular = task.is_singular;
       break;
     }
-    case ArmMode::guiding:
-      dynamics_.equation(angle_rad_, speed_rad_s_, mass_kg_m2, torque_Nm);
-      break;
+    case ArmMode::guiding: guide(torque_Nm); break;
   }
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const double wanted_Nm =
@@ -373,6 +375,22 @@ void ArmController::follow_position(const ArmReference& reference) noexcept {
         .acceleration_rad_s2 = reference.acceleration_rad_s2[j],
         .torque_Nm = spring_Nm + settings_.friction_share * drive_Nm};
   }
+}
+
+void ArmController::guide(ArmDynamics::PerJoint& torque_Nm) noexcept {
+  ArmDynamics::JointMatrix mass_kg_m2;
+  dynamics_.equation(angle_rad_, speed_rad_s_, mass_kg_m2, torque_Nm);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Axis& axis = joints_[j];
+    const double moved_rad = is_guided_ ? angle_rad_[j] - last_angle_rad_[j] : -axis.guided_rad;
+    axis.guided_rad =
+        std::clamp(axis.guided_rad + moved_rad, -kGuidingWidth_rad, kGuidingWidth_rad);
+    torque_Nm[j] -=
+        mass_kg_m2[j * (joints_.size() + 1)] * speed_rad_s_[j] / settings_.guiding_decay_s +
+        axis.guiding_friction_Nm * axis.guided_rad / kGuidingWidth_rad;
+  }
+  last_angle_rad_ = angle_rad_;
+  is_guided_ = true;
 }
 
 // T and q̈ of the links as they are.

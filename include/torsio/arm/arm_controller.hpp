@@ -66,9 +66,10 @@ enum class ArmStopCause : std::uint8_t {
 ///                 τ_s the part of τ* that the spring carries, q̈ that of the links under the estimated torques
 ///     impedance   τ_ff = g(q) + τ_b(q̇), in the impedance mode of the joint
 ///     cartesian   τ* = `CartesianImpedance` + s τ_b(q̇), in its torque mode
-///     guiding     τ* = c(q, q̇) + g(q) + s τ_b(q̇), in its torque mode
+///     guiding     τ* = c(q, q̇) + g(q) + s τ_b(q̇) − M_ii q̇ / T_g − F_g e / w, in its torque mode
 ///
-/// s = `friction_share` below 1: more friction than there is must not be compensated. The wanted motion gives the
+/// e is the way since the last reversal, within ±w = 0.01 rad: a friction F_g holds the arm where it is left, although the
+/// torque of a spring is never exact. s = `friction_share` below 1: more friction than there is must not be compensated. The wanted motion gives the
 /// friction its sign where there is one, the measured one elsewhere.
 ///
 /// A fault in one joint stops all of them: each goes to rest by its own `JointStop`, a joint without a usable measurement
@@ -89,6 +90,7 @@ class ArmController {
     /// that was trained with a load cell at the link.
     double bearing_Nm = 0.0;
     double viscous_Nms_rad = 0.0;      ///< d
+    double guiding_friction_Nm = 0.0;  ///< F_g
     double largest_external_Nm = 0.0;  ///< above it for `longest_overload_s`: a stop
   };
   struct Settings {
@@ -102,6 +104,7 @@ class ArmController {
     /// `fastest_swing_rad_s`, which the motor side does not follow. An integral without it would destabilise the swing.
     double link_damping = 0.3;
     double fastest_swing_rad_s = 25.0;
+    double guiding_decay_s = 0.4;          ///< T_g: an arm that is pushed and let go comes to rest
     double largest_correction_rad = 0.05;  ///< limit of the integral k ∫ (q* − q) dt
     /// The position mode does not begin farther from the measured angles than this: the reference is refused.
     double largest_start_error_rad = 0.05;
@@ -185,7 +188,9 @@ class ArmController {
     double bearing_Nm;
     double viscous_Nms_rad;
     double largest_external_Nm;
+    double guiding_friction_Nm;
     double correction_rad = 0.0;
+    double guided_rad = 0.0;   ///< e
     JointState measured = {};  ///< motor side over the ratio, and the linear spring
     std::uint32_t lost = 0;    ///< ticks in a row without a sample
     double overloaded_s = 0.0;
@@ -201,6 +206,7 @@ class ArmController {
   void hold() noexcept;
   void references(const ArmReference& reference) noexcept;
   void follow_position(const ArmReference& reference) noexcept;
+  void guide(ArmDynamics::PerJoint& torque_Nm) noexcept;
   void find_swing(ArmDynamics::PerJoint& damping_s,
                   ArmDynamics::PerJoint& acceleration_rad_s2) const noexcept;
   [[nodiscard]] double bearing_torque(const Axis& axis, double speed_rad_s) const noexcept;
@@ -220,6 +226,8 @@ class ArmController {
       {};  ///< where the arm was at the first step, or when a reference was refused
   bool is_started_ = false;
   bool is_holding_ = false;
+  bool is_guided_ = false;  ///< in the last tick
+  ArmDynamics::PerJoint last_angle_rad_ = {};
   bool is_following_ = false;  ///< a reference of the position mode was accepted in the last tick
   Output output_;
 };

@@ -49,6 +49,8 @@ constexpr double kUnmeasuredShare = 0.05;
 constexpr double kOverride_rad_s = 100.0;
 /// An external torque above this share of the rating is not a hand.
 constexpr double kOverloadShare = 1.0;
+/// Holds a guided arm against the error of the estimated torques: 6 Nm in a joint of 300 Nm.
+constexpr double kGuidingShare = 0.02;
 
 using ReadText = std::function<std::string(const std::string&)>;
 
@@ -228,6 +230,7 @@ ArmController::Settings arm_controller_settings(
         .stop = stop_of(sheet, weight_Nm[j]),
         .bearing_Nm = sheet.joint.bearing_friction_Nm.value,
         .viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value,
+        .guiding_friction_Nm = kGuidingShare * sheet.rating.torque_Nm.value,
         .largest_external_Nm = kOverloadShare * sheet.rating.torque_Nm.value};
     joint.inverse = LinearInverse(joint.control.torque.deflection.joint.stiffness_Nm_rad);
     if (!from.model.empty()) {
