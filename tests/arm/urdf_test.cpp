@@ -94,7 +94,7 @@ TEST(Urdf, FramesThatAreFixedToTheBaseCount) {
             "<limit lower='-1' upper='1' effort='10' velocity='2'/>")));
   EXPECT_NEAR(arm.joints[0].origin.position_m[0], 1.0, 1e-12);
   EXPECT_NEAR(arm.joints[0].origin.position_m[1], 0.5, 1e-12);
-  EXPECT_EQ(arm.joints[0].axis, (Vector3{0, 0, 1}));  // of length 1
+  EXPECT_EQ(arm.joints[0].axis, (Vector3{0, 0, 1}));  // its length is 1
 }
 
 TEST(Urdf, RollPitchAndYawAreAboutFixedAxes) {

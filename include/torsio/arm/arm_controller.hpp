@@ -104,7 +104,7 @@ class ArmController {
     /// `fastest_swing_rad_s`, which the motor side does not follow. An integral without it would destabilise the swing.
     double link_damping = 0.3;
     double fastest_swing_rad_s = 25.0;
-    double guiding_decay_s = 0.4;          ///< T_g: an arm that is pushed and let go comes to rest
+    double guiding_decay_s = 0.4;          ///< T_g: time in which the motion after a push decays
     double largest_correction_rad = 0.05;  ///< limit of the integral k ∫ (q* − q) dt
     /// The position mode does not begin farther from the measured angles than this: the reference is refused.
     double largest_start_error_rad = 0.05;
