@@ -279,6 +279,7 @@ Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows 
   Recording recording(run.name, clock.sample_rate_Hz, clock.start_s);
   recording.source = table.source;
   recording.zeros = mapping.zero;
+  recording.columns = columns_of_channels(columns, mapping);
   recording.notes = table.notes;
   recording.not_read = table.not_read;
   if (trimmed > 0)

@@ -1,0 +1,159 @@
+#include "check/dropouts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "check/signal_faults.hpp"
+#include "numerics/quantile.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kShortestBurst = 4;
+constexpr std::size_t kShortestHold = 10;  ///< so many equal ones by chance do not occur
+constexpr std::size_t kFewestBursts = 2;
+constexpr double kUsualSteps = 0.99;
+constexpr double kOverUsualSteps = 5.0;
+constexpr double kMaxBurstShare = 0.5;
+constexpr double kFewEqual = 0.2;  ///< share of equal neighbours outside of the bursts
+constexpr std::size_t kMaxJumps = 12;
+constexpr std::size_t kNearJump = 3;
+
+/// A run of equal new samples, by their numbers.
+struct Run {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  double jump_there = 0.0;
+  double jump_back = 0.0;
+};
+
+std::vector<Run> runs_of(const std::vector<double>& values) {
+  std::vector<Run> runs;
+  for (std::size_t begin = 0, end = 0; begin < values.size(); begin = end) {
+    end = begin + 1;
+    while (end < values.size() && values[end] == values[begin]) ++end;
+    if (end - begin < kShortestBurst || begin == 0 || end == values.size()) continue;
+    runs.push_back({.begin = begin,
+                    .end = end,
+                    .jump_there = std::abs(values[begin] - values[begin - 1]),
+                    .jump_back = std::abs(values[end] - values[end - 1])});
+  }
+  return runs;
+}
+
+/// The value that most runs have that are entered and left with a jump.
+std::vector<Run> runs_of_one_value(const std::vector<Run>& runs, const std::vector<double>& values,
+                                   double jump) {
+  std::map<double, std::size_t> times;
+  for (const Run& run : runs)
+    if (run.jump_there >= jump && run.jump_back >= jump) ++times[values[run.begin]];
+  if (times.empty()) return {};
+  const auto usual = std::ranges::max_element(
+      times, [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (usual->second < kFewestBursts) return {};
+  std::vector<Run> found;
+  for (const Run& run : runs)
+    if (values[run.begin] == usual->first && std::max(run.jump_there, run.jump_back) >= jump)
+      found.push_back(run);
+  return found;
+}
+
+std::vector<Run> held_runs(const std::vector<Run>& runs, const std::vector<double>& values,
+                           double jump) {
+  std::size_t equal = 0;
+  for (std::size_t k = 1; k < values.size(); ++k)
+    if (values[k] == values[k - 1]) ++equal;
+  std::vector<Run> found;
+  for (const Run& run : runs) {
+    if (run.end - run.begin < kShortestHold) continue;
+    equal -= run.end - run.begin - 1;
+    if (run.jump_back >= jump && run.jump_there < jump) found.push_back(run);
+  }
+  const bool is_measured_anew =
+      static_cast<double>(equal) < kFewEqual * static_cast<double>(values.size());
+  return found.size() >= kFewestBursts && is_measured_anew ? found : std::vector<Run>{};
+}
+
+/// Whether the channel comes to such a run from another rest, and leaves it to one, as a command does that steps.
+bool is_between_rests(const std::vector<Run>& found, const std::vector<double>& values) {
+  const auto beside_rest = std::ranges::count_if(found, [&](const Run& run) {
+    const bool before = run.begin >= 2 && values[run.begin - 1] == values[run.begin - 2];
+    const bool after = run.end + 1 < values.size() && values[run.end] == values[run.end + 1];
+    return before || after;
+  });
+  return 2 * static_cast<std::size_t>(beside_rest) > found.size();
+}
+
+}  // namespace
+
+std::optional<Dropouts> find_dropouts(const Channel& channel, double least) {
+  const std::vector<std::size_t> samples = new_samples(channel);
+  if (samples.size() < kFewestSamples) return {};
+  std::vector<double> values;
+  for (const std::size_t i : samples) values.push_back(channel.values[i]);
+  const std::vector<Run> runs = runs_of(values);
+  if (runs.size() < kFewestBursts) return {};
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < values.size(); ++k)
+    steps.push_back(std::abs(values[k] - values[k - 1]));
+  const double jump = std::max(least, kOverUsualSteps * quantile(std::move(steps), kUsualSteps));
+  std::vector<Run> found = runs_of_one_value(runs, values, jump);
+  const bool is_one_value = !found.empty() && !is_between_rests(found, values);
+  if (!is_one_value) found = held_runs(runs, values, jump);
+  if (found.empty()) return {};
+  Dropouts dropouts{.is_one_value = is_one_value,
+                    .value = values[found.front().begin],
+                    .shortest = channel.values.size(),
+                    .bursts = {}};
+  std::size_t all = 0;
+  for (const Run& run : found) {
+    const Rest burst{samples[run.begin], samples[run.end]};
+    all += burst.length();
+    dropouts.shortest = std::min(dropouts.shortest, burst.length());
+    dropouts.longest = std::max(dropouts.longest, burst.length());
+    dropouts.highest_jump = std::max({dropouts.highest_jump, run.jump_there, run.jump_back});
+    dropouts.bursts.push_back(burst);
+  }
+  if (static_cast<double>(all) > kMaxBurstShare * static_cast<double>(channel.values.size()))
+    return {};
+  return dropouts;
+}
+
+std::optional<Jumps> find_jumps(const std::vector<double>& values, double code, double times) {
+  if (values.size() < kFewestSamples) return {};
+  const auto height = [&](std::size_t i) { return std::abs(values[i] - values[i - 1]); };
+  std::vector<std::size_t> order;
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (is_finite(height(i))) order.push_back(i);
+  constexpr std::size_t kEnough = (2 * kNearJump + 1) * (kMaxJumps + 1);
+  const std::size_t enough = std::min(kEnough, order.size());
+  std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(enough),
+                            [&](std::size_t a, std::size_t b) {
+                              return std::pair(-height(a), a) < std::pair(-height(b), b);
+                            });
+  order.resize(enough);
+  std::vector<std::size_t> places;  // the highest ones, each but once
+  for (const std::size_t i : order) {
+    const auto is_near = [&](std::size_t place) {
+      return i + kNearJump >= place && i <= place + kNearJump;
+    };
+    if (places.size() <= kMaxJumps && std::ranges::none_of(places, is_near)) places.push_back(i);
+  }
+  if (places.empty()) return {};
+  for (std::size_t count = std::min(places.size() - 1, kMaxJumps); count >= 2; --count) {
+    const double next = height(places[count]);
+    if (!(height(places[count - 1]) >= times * std::max(next, code))) continue;
+    Jumps jumps{.samples = {places.begin(), places.begin() + static_cast<std::ptrdiff_t>(count)},
+                .lowest = height(places[count - 1]),
+                .highest = height(places.front()),
+                .next_height = next};
+    std::ranges::sort(jumps.samples);
+    return jumps;
+  }
+  return {};
+}
+
+}  // namespace torsio
