@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
+#include <set>
 #include <utility>
 
 #include "check/signal_faults.hpp"
@@ -44,20 +44,20 @@ std::vector<Run> runs_of(const std::vector<double>& values) {
   return runs;
 }
 
-/// The value that most runs have that are entered and left with a jump.
+/// The runs of the value that most of them have that are entered or left with a jump, at least one of them with both.
 std::vector<Run> runs_of_one_value(const std::vector<Run>& runs, const std::vector<double>& values,
                                    double jump) {
-  std::map<double, std::size_t> times;
-  for (const Run& run : runs)
-    if (run.jump_there >= jump && run.jump_back >= jump) ++times[values[run.begin]];
-  if (times.empty()) return {};
-  const auto usual = std::ranges::max_element(
-      times, [](const auto& a, const auto& b) { return a.second < b.second; });
-  if (usual->second < kFewestBursts) return {};
+  std::map<double, std::vector<Run>> by_value;
+  std::set<double> with_both;  // where the signal passes the value just then, one jump is small
+  for (const Run& run : runs) {
+    if (std::max(run.jump_there, run.jump_back) < jump) continue;
+    by_value[values[run.begin]].push_back(run);
+    if (std::min(run.jump_there, run.jump_back) >= jump) with_both.insert(values[run.begin]);
+  }
   std::vector<Run> found;
-  for (const Run& run : runs)
-    if (values[run.begin] == usual->first && std::max(run.jump_there, run.jump_back) >= jump)
-      found.push_back(run);
+  for (const double value : with_both)
+    if (by_value[value].size() >= kFewestBursts && by_value[value].size() > found.size())
+      found = by_value[value];
   return found;
 }
 
@@ -145,9 +145,10 @@ std::optional<Jumps> find_jumps(const std::vector<double>& values, double code, 
   if (places.empty()) return {};
   for (std::size_t count = std::min(places.size() - 1, kMaxJumps); count >= 2; --count) {
     const double next = height(places[count]);
-    if (!(height(places[count - 1]) >= times * std::max(next, code))) continue;
+    const double lowest = height(places[count - 1]);
+    if (!(lowest > 0.0 && lowest >= times * std::max(next, code))) continue;
     Jumps jumps{.samples = {places.begin(), places.begin() + static_cast<std::ptrdiff_t>(count)},
-                .lowest = height(places[count - 1]),
+                .lowest = lowest,
                 .highest = height(places.front()),
                 .next_height = next};
     std::ranges::sort(jumps.samples);

@@ -18,7 +18,7 @@ constexpr std::size_t kReversalsOfAHalfWave = 4;
 constexpr std::size_t kFewestHalfWaves = 2;
 constexpr double kLeastRest = 0.01;     ///< share of the target's variance
 constexpr double kCourseLeaves = 0.25;  ///< share of what the curve leaves
-constexpr double kCourseRange = 0.1;    ///< share of the target's range
+constexpr double kCourseRange = 0.08;   ///< share of the target's range
 
 }  // namespace
 
@@ -48,7 +48,7 @@ std::optional<SlowCourse> find_slow_course(const Pair& pair, double sample_rate_
   }
   const Eigen::VectorXd coefficients = beyond.colPivHouseholderQr().solve(rest);
   course.left = (rest - beyond * coefficients).squaredNorm() / rest.squaredNorm();
-  const Eigen::VectorXd values = waves * coefficients;
+  const Eigen::VectorXd values = beyond * coefficients;
   course.range = values.maxCoeff() - values.minCoeff();
   if (!(course.left <= kCourseLeaves &&
         course.range >= kCourseRange * extent_of(pair.target).width()))

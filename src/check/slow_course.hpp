@@ -14,7 +14,7 @@ struct SlowCourse {
   double left = 1.0;         ///< share of that which the slow function leaves
 };
 /// Cosines of one to eight half-waves over the recording, each with four reversals of the input. Empty unless they explain
-/// three quarters of at least 1 % of the variance, and pass through a tenth of the target's range.
+/// three quarters of at least 1 % of the variance, and pass through 8 % of the target's range.
 [[nodiscard]] std::optional<SlowCourse> find_slow_course(const Pair& pair, double sample_rate_Hz);
 
 }  // namespace torsio
