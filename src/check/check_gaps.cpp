@@ -35,6 +35,18 @@ std::vector<SampleRange> places_of_jumps(const Jumps& jumps) {
   return places;
 }
 
+constexpr double kTurn_s = 0.05;
+
+/// Whether the jumps are where the input turns, as those of a friction; at most one of four or more is elsewhere.
+bool are_at_turns(const Jumps& jumps, const std::vector<double>& input, std::size_t window) {
+  const auto at_turn = std::ranges::count_if(jumps.samples, [&](std::size_t i) {
+    if (i < window || i + window >= input.size()) return true;
+    return !((input[i] - input[i - window]) * (input[i + window] - input[i]) > 0.0);
+  });
+  const auto all = std::ssize(jumps.samples);
+  return at_turn >= (all >= 4 ? all - 1 : all);
+}
+
 /// Whether the channel may step, as a current or a voltage does.
 bool may_step(std::string_view channel) {
   const auto parts = split_channel_name(channel);
@@ -52,9 +64,11 @@ bool Checker::check_jumps(std::size_t r, const Channel& channel,
   auto jumps = find_jumps(values, finest_step(channel), kJumpOverOthers);
   if (!jumps || jumps->lowest < kJumpShare * extent_of(values).width()) return false;
   for (std::size_t& sample : jumps->samples) sample = samples[sample];
-  if (std::ranges::any_of(jumps->samples, [&](std::size_t sample) {
-        return is_end_of_stall(r, sample) || is_spike(r, sample);
-      }))
+  if (std::ranges::any_of(
+          jumps->samples,
+          [&](std::size_t sample) { return is_end_of_stall(r, sample) || is_spike(r, sample); }) ||
+      are_at_turns(*jumps, pairs_[r].input,
+                   static_cast<std::size_t>(kTurn_s * dataset_.sample_rate_Hz())))
     return false;
   const Recording& recording = dataset_.records[r].recording;
   add(Verdict::warn, "gaps", recording.name(), jumps_text(recording, channel.name, *jumps),
@@ -104,10 +118,13 @@ bool Checker::check_dropouts(std::size_t r, const Channel& channel) {
   const auto ms = [&](std::size_t samples) {
     return 1e3 * static_cast<double>(samples) / recording.sample_rate_Hz();
   };
+  const std::string lengths =
+      dropouts->shortest == dropouts->longest
+          ? fmt::format("{:.0f} ms", ms(dropouts->longest))
+          : fmt::format("{:.0f} to {:.0f} ms", ms(dropouts->shortest), ms(dropouts->longest));
   const std::string bursts =
-      fmt::format("in {} bursts of {:.0f} to {:.0f} ms, the first from t = {:.4g} s on",
-                  dropouts->bursts.size(), ms(dropouts->shortest), ms(dropouts->longest),
-                  recording.time_s(dropouts->bursts.front().begin));
+      fmt::format("in {} bursts of {}, the first from t = {:.4g} s on", dropouts->bursts.size(),
+                  lengths, recording.time_s(dropouts->bursts.front().begin));
   if (dropouts->is_one_value)
     add(Verdict::warn, "frozen sensors", recording.name(),
         fmt::format("{} is exactly {:.6g} {} {}, and jumps there and back, by up to {:.3g} {}",

@@ -132,11 +132,12 @@ void Checker::report_rate(std::size_t r, const std::string& name, double factor,
   add(is_known && is_input ? Verdict::fail : Verdict::warn, "units", recording.name(),
       fmt::format("{} is {:.4g} times the derivative of its angle (correlation {:.3f})", name,
                   factor, together),
-      is_known
-          ? cause + rule_advice(recording, name, line) +
-                (factor < 0.0 ? "  If the angle has the wrong sign instead, invert that one." : "")
-          : "Check the unit and the sign of the speed, and whether a gear is between the two "
-            "sensors (gear_ratio: in a mapping).");
+      is_known ? cause + rule_advice(recording, name, line) +
+                     (factor < 0.0
+                          ? "\n         If the angle has the wrong sign instead, invert that one."
+                          : "")
+               : "Check the unit and the sign of the speed, and whether a gear is between the two "
+                 "sensors (gear_ratio: in a mapping).");
 }
 
 }  // namespace torsio

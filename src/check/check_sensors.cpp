@@ -64,10 +64,12 @@ std::vector<double> turns_of(const Recording& recording, const std::string& name
 std::string text_on_zero(const std::string& name, double span) {
   const auto parts = split_channel_name(name);
   if (parts && parts->unit->si_suffix == "rad")
-    return " The zero is then that of the turn in which a recording begins: give each recording "
+    return "\n         The zero is then that of the turn in which a recording begins: give each "
+           "recording "
            "its zero (zero: in the mapping).";
   return fmt::format(
-      " The first number of a recording is taken as it is: where {0} begins beyond the range of "
+      "\n         The first number of a recording is taken as it is: where {0} begins beyond the "
+      "range of "
       "its "
       "numbers, add offset: {1:.9g} or offset: -{1:.9g} ({2}) to the same rule.",
       name, span, unit_label(name));
@@ -136,7 +138,8 @@ std::string Checker::coding_advice(std::size_t r, const std::string& name,
     } else if (spans != 0.0 && is_offset_on(r, name)) {
       entries += fmt::format(", offset: {:.9g}", (is_subtrahend ? spans : -spans) * coded.span);
       rest += fmt::format(
-          " The offset (in {}) brings it to the turn of the other angle; another recording may "
+          "\n         The offset (in {}) brings it to the turn of the other angle; another "
+          "recording may "
           "need another one.",
           unit_label(name));
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 #include <utility>
@@ -21,6 +22,7 @@ constexpr double kMaxBurstShare = 0.5;
 constexpr double kFewEqual = 0.2;  ///< share of equal neighbours outside of the bursts
 constexpr std::size_t kMaxJumps = 12;
 constexpr std::size_t kNearJump = 3;
+constexpr double kOtherSteps = 0.2;  ///< share of a jump
 
 /// A run of equal new samples, by their numbers.
 struct Run {
@@ -143,10 +145,22 @@ std::optional<Jumps> find_jumps(const std::vector<double>& values, double code, 
     if (places.size() <= kMaxJumps && std::ranges::none_of(places, is_near)) places.push_back(i);
   }
   if (places.empty()) return {};
+  // A friction that reverses takes several samples; a jump is one step, or two where it was interpolated.
+  const auto is_abrupt = [&](std::size_t place) {
+    std::vector<double> near;
+    for (std::size_t i = place > kNearJump ? place - kNearJump : 1;
+         i < std::min(values.size(), place + kNearJump + 1); ++i)
+      if (is_finite(height(i))) near.push_back(height(i));
+    std::ranges::sort(near, std::greater<>());
+    return near.size() < 3 || near[2] <= kOtherSteps * near[0];
+  };
   for (std::size_t count = std::min(places.size() - 1, kMaxJumps); count >= 2; --count) {
     const double next = height(places[count]);
     const double lowest = height(places[count - 1]);
     if (!(lowest > 0.0 && lowest >= times * std::max(next, code))) continue;
+    if (!std::all_of(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(count),
+                     is_abrupt))
+      continue;
     Jumps jumps{.samples = {places.begin(), places.begin() + static_cast<std::ptrdiff_t>(count)},
                 .lowest = lowest,
                 .highest = height(places.front()),

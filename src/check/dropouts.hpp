@@ -31,7 +31,7 @@ struct Jumps {
   double highest = 0.0;
   double next_height = 0.0;  ///< the highest step elsewhere
 };
-/// Two to twelve places, each by `times` of what is passed through anywhere else. One is found by `largest_jump`.
+/// Two to twelve places, each by `times` of what is passed through anywhere else, within two samples. One is found by `largest_jump`.
 /// @param code resolution of the values: steps of few codes are none
 [[nodiscard]] std::optional<Jumps> find_jumps(const std::vector<double>& values, double code,
                                               double times);

@@ -48,7 +48,11 @@ std::optional<SlowCourse> find_slow_course(const Pair& pair, double sample_rate_
   }
   const Eigen::VectorXd coefficients = beyond.colPivHouseholderQr().solve(rest);
   course.left = (rest - beyond * coefficients).squaredNorm() / rest.squaredNorm();
-  const Eigen::VectorXd values = beyond * coefficients;
+  // The relaxations are nearly functions of time as well.
+  const FixedColumns without(columns.leftCols(columns.cols() - relaxations.cols()));
+  for (Eigen::Index k = 0; k < waves.cols(); ++k) beyond.col(k) = without.residual(waves.col(k));
+  const Eigen::VectorXd values =
+      waves * beyond.colPivHouseholderQr().solve(without.residual(target));
   course.range = values.maxCoeff() - values.minCoeff();
   if (!(course.left <= kCourseLeaves &&
         course.range >= kCourseRange * extent_of(pair.target).width()))

@@ -109,7 +109,8 @@ TEST(CheckGaps, WarnOfSeveralSlipsOfOneAngle) {
 /// The same samples at another rate, read from a column of stamps.
 Recording at_rate(double rate_Hz, const std::string& column, const std::string& unit) {
   Recording recording("clock", rate_Hz);
-  for (Channel channel : long_bench().channels()) recording.add(std::move(channel));
+  const Recording sound = long_bench();
+  for (Channel channel : sound.channels()) recording.add(std::move(channel));
   recording.columns = {{"t_s", column, unit}};
   return recording;
 }
@@ -181,7 +182,8 @@ TEST(CheckRates, CompareASpeedWithTheDerivativeOfItsAngle) {
 
 TEST(CheckRepeats, NameEveryBlockThatIsWrittenTwice) {
   Recording recording("flushed", 1000.0);
-  for (Channel copy : long_bench().channels()) {
+  const Recording bench = long_bench();
+  for (Channel copy : bench.channels()) {
     const std::vector<double> sound = copy.values;
     const auto flush = [&](std::size_t at, double rounding) {
       for (std::size_t i = 0; i < 512; ++i)
@@ -227,7 +229,8 @@ double within_half_turn(double value) {
 
 TEST(CheckCoding, GivesTheOneWrappedAngleOfTwoTheTurnOfTheOther) {
   Recording recording("wrapped", 1000.0);
-  for (Channel channel : long_bench().channels()) {
+  const Recording sound = long_bench();
+  for (Channel channel : sound.channels()) {
     if (channel.name != "torque_Nm")
       for (double& value : channel.values) value += 3.2;
     if (channel.name == "joint_angle_rad")
@@ -273,7 +276,7 @@ TEST(CheckUnits, WarnOfADeflectionOfAWholeTurn) {
 }
 
 /// A triangle whose period is 10 s, with a friction that grows with the load.
-Recording slow_triangle() {
+Recording slow_triangle(double width_rad_s = 0.005) {
   Random random(8);
   Channel deflection{"spring_deflection_rad", {}};
   Channel torque{"torque_Nm", {}};
@@ -282,7 +285,8 @@ Recording slow_triangle() {
     const double x = 0.09 * (2.0 / std::numbers::pi) *
                      std::asin(0.999 * std::sin(2.0 * std::numbers::pi * 1e-4 * n));
     const double load = 300.0 * x + 4000.0 * x * x * x;
-    torque.values.push_back(load + 0.08 * std::abs(load) * std::tanh(1e3 * (x - last) / 0.005) +
+    torque.values.push_back(load +
+                            0.08 * std::abs(load) * std::tanh(1e3 * (x - last) / width_rad_s) +
                             0.03 * random.normal());
     last = x;
     deflection.values.push_back(x);
@@ -296,6 +300,14 @@ Recording slow_triangle() {
 TEST(CheckDelay, IsNotFoundWhereItExplainsHardlyAnything) {
   const auto findings = findings_of(alone(slow_triangle()));
   EXPECT_EQ(verdict_of(findings, "delay"), Verdict::pass) << text_of(findings);
+  EXPECT_EQ(verdict_of(findings, "gaps"), Verdict::pass) << text_of(findings);
+}
+
+TEST(CheckGaps, AreNotFoundWhereAFrictionReverses) {
+  for (const double width_rad_s : {1e-6, 0.002}) {
+    const auto findings = findings_of(alone(slow_triangle(width_rad_s)));
+    EXPECT_EQ(verdict_of(findings, "gaps"), Verdict::pass) << text_of(findings);
+  }
 }
 
 /// A sweep whose spring relaxes with two time constants; the stiffness grows by `stiffer` meanwhile.
