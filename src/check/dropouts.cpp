@@ -19,7 +19,9 @@ constexpr std::size_t kFewestBursts = 2;
 constexpr double kUsualSteps = 0.99;
 constexpr double kOverUsualSteps = 5.0;
 constexpr double kMaxBurstShare = 0.5;
-constexpr double kFewEqual = 0.2;  ///< share of equal neighbours outside of the bursts
+constexpr double kFewEqual = 0.2;     ///< share of equal neighbours outside of the bursts
+constexpr double kLeastNoise = 1e-4;  ///< share of the range
+constexpr double kAnyRate_Hz = 100.0;
 constexpr std::size_t kMaxJumps = 12;
 constexpr std::size_t kNearJump = 3;
 constexpr double kOtherSteps = 0.2;  ///< share of a jump
@@ -104,7 +106,13 @@ std::optional<Dropouts> find_dropouts(const Channel& channel, double least) {
   const double jump = std::max(least, kOverUsualSteps * quantile(std::move(steps), kUsualSteps));
   std::vector<Run> found = runs_of_one_value(runs, values, jump);
   const bool is_one_value = !found.empty() && !is_between_rests(found, values);
-  if (!is_one_value) found = held_runs(runs, values, jump);
+  // A joint that sticks rests as well, and leaves with a jump; its sensor keeps its noise.
+  const Channel plain{.name = channel.name, .values = values};
+  const double noise = usual_noise(noise_course(plain, kAnyRate_Hz));
+  if (!is_one_value) {
+    if (noise < kLeastNoise * extent_of(values).width()) return {};
+    found = held_runs(runs, values, jump);
+  }
   if (found.empty()) return {};
   Dropouts dropouts{.is_one_value = is_one_value,
                     .value = values[found.front().begin],

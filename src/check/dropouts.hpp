@@ -19,7 +19,7 @@ struct Dropouts {
   std::vector<Rest> bursts;
 };
 /// At least two bursts of four or more equal new samples, in less than half of the recording. Either all have exactly
-/// one value, and the channel jumps to it or back, at least once both; or the channel, which has nearly no two equal neighbours elsewhere,
+/// one value, and the channel jumps to it or back, at least once both; or the channel, which has noise and nearly no two equal neighbours elsewhere,
 /// holds its last value and then jumps to the measured one. A jump is above `least` and five times the steps of 99 % of
 /// the samples. A channel that jumps to a value and rests there, such as a command, jumps from a rest.
 [[nodiscard]] std::optional<Dropouts> find_dropouts(const Channel& channel, double least);

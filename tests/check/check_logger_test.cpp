@@ -321,6 +321,7 @@ Recording relaxing_sweep(bool is_upward, double relaxing_Nm_rad, double stiffer)
   for (int n = 0; n < 30000; ++n) {
     const double t_s = 2e-3 * (is_upward ? n : 29999 - n);
     const double x = 0.09 * std::sin(2.0 * std::numbers::pi * 0.05 / rise * std::expm1(rise * t_s));
+    if (n == 0) slow = fast = x;
     slow += 2e-3 / 1.5 * (x - slow);
     fast += 2e-3 / 0.15 * (x - fast);
     deflection.values.push_back(x);
@@ -343,6 +344,24 @@ TEST(CheckChange, IsNotFoundInASpringThatRelaxesWhileTheRateOfTheMotionChanges) 
       EXPECT_EQ(verdict_of(changing, "change"), Verdict::warn) << stiffer;
     }
   }
+}
+
+TEST(CheckChange, WarnOfAZeroThatDriftsAndReturns) {
+  const auto drifting = [](double amplitude_Nm) {
+    const Recording sound = bench_recording("drifting", {.samples = 40000});
+    return findings_of(alone(with_channel(sound, "torque_Nm", [&](Channel& channel) {
+      for (std::size_t n = 0; n < channel.values.size(); ++n)
+        channel.values[n] +=
+            amplitude_Nm * std::cos(1e-4 * std::numbers::pi * static_cast<double>(n));
+    })));
+  };
+  EXPECT_EQ(verdict_of(drifting(0.0), "change"), Verdict::pass);
+  const auto findings = drifting(4.0);
+  ASSERT_EQ(verdict_of(findings, "change"), Verdict::warn) << text_of(findings);
+  const std::string& message = first_of(findings, "change").message;
+  const std::size_t at = message.find("changes slowly by ");
+  ASSERT_NE(at, std::string::npos) << message;
+  EXPECT_NEAR(std::stod(message.substr(at + 18)), 8.0, 1.0) << message;
 }
 
 }  // namespace
