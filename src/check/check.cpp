@@ -60,6 +60,7 @@ void Checker::run_checks(bool with_warnings) {
   if (with_warnings) check_ends();
   check_length();
   if (has_failed()) return;  // too short for the other checks
+  if (with_warnings) check_clock();
   check_missing();
   check_constant();
   check_coding();

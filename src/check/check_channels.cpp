@@ -181,7 +181,7 @@ bool Checker::is_turn(std::size_t r, const Channel& channel, double extreme) con
 void Checker::check_frozen() {
   pass_unless_found("frozen sensors", "none is constant while the others move", [&] {
     for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
-      if (is_condition(recording, channel.name)) return;
+      if (is_condition(recording, channel.name) || check_dropouts(r, channel)) return;
       const auto shortest = static_cast<std::size_t>(0.5 * kFrozen_s * recording.sample_rate_Hz());
       const std::vector<Rest> rests = rests_of(channel, std::max<std::size_t>(shortest, 2));
       if (rests.empty()) return;
@@ -279,95 +279,6 @@ void Checker::check_resolution_of(std::size_t r) {
         "Check whether the sensor has lost bits or the log has too few digits. No model "
         "resolves finer steps.");
   }
-}
-
-bool Checker::stands_out(const Jump& jump, const std::vector<double>& values) {
-  return jump.height > 0.0 && jump.height >= kJumpShare * extent_of(values).width() &&
-         jump.height >= kJumpOverOthers * jump.next_height;
-}
-
-void Checker::check_gaps(bool with_warnings) {
-  pass_unless_found("gaps", "no jump", [&] {
-    for_each_record([&](std::size_t r) { check_gaps_of(r, with_warnings); });
-  });
-}
-
-void Checker::check_gaps_of(std::size_t r, bool with_warnings) {
-  if (coded_[r] != 0) return;  // numbers that begin again jump
-  check_jump_of_input(r);      // later checks leave a recording with a jump out
-  if (!with_warnings) return;
-  if (!check_cut(r)) check_cadence(r);
-  const Recording& recording = dataset_.records[r].recording;
-  for (const std::string& name : channels_) {
-    const Channel& channel = recording.channel(name);
-    if (is_condition(recording, name) || stands_still(r, name)) continue;
-    // Between the new samples of a slow sensor there is no jump.
-    const std::vector<double> whole = bridged(channel);
-    std::vector<std::size_t> samples;
-    std::vector<double> values;
-    for (std::size_t i = 0; i < whole.size(); ++i)
-      if (channel.is_fresh(i)) samples.push_back(i), values.push_back(whole[i]);
-    Jump jump = largest_jump(values);
-    if (!samples.empty()) jump.sample = samples[jump.sample];
-    if (!stands_out(jump, values) || is_end_of_stall(r, jump.sample) ||
-        is_sign_flip(r, name, jump) || is_spike(r, jump.sample) ||
-        (spoiled_[r] != 0 && is_source(name)))
-      continue;
-    add(Verdict::warn, "gaps", recording.name(), jump_text(recording, name, jump),
-        "Check for lost samples and a slipping sensor. Cut the recording in two there.",
-        {{jump.sample, jump.sample + 1}});
-  }
-}
-
-// A step that is small for an angle can be the whole range of the deflection between two angles.
-void Checker::check_jump_of_input(std::size_t r) {
-  const std::vector<double>& input = pairs_[r].input;
-  const Jump jump = largest_jump(input);
-  if (sources_.size() < 2 || !stands_out(jump, input) || is_spike(r, jump.sample) ||
-      jump.height < kInputJumpShare * extent_of(input).width())
-    return;
-  const Recording& recording = dataset_.records[r].recording;
-  spoiled_[r] = 1;
-  add(Verdict::warn, "gaps", recording.name(),
-      jump_text(recording, spec_.inputs.front(), jump) +
-          fmt::format("; it comes from {}", source_of(recording, jump)),
-      "Check whether that sensor slipped or lost counts or samples, or a part broke. Cut the "
-      "recording in two there, and determine the zero of each part.",
-      {{jump.sample, jump.sample + 1}});
-}
-
-std::string Checker::jump_text(const Recording& recording, const std::string& name,
-                               const Jump& jump) {
-  return fmt::format("{} jumps by {:.3g} at t = {:.4g} s, {} anywhere else", name, jump.height,
-                     recording.time_s(jump.sample),
-                     jump.next_height > 0.0
-                         ? fmt::format("{:.4g} times more than", jump.height / jump.next_height)
-                         : "and does not move");
-}
-
-/// The channel whose step at a jump of the first input is largest compared with its other steps.
-const std::string& Checker::source_of(const Recording& recording, const Jump& jump) const {
-  const auto excess = [&](const std::string& name) {
-    const std::vector<double>& values = recording.channel(name).values;
-    const auto step = [&](std::size_t i) {
-      return i > 0 && i < values.size() ? values[i] - values[i - 1] : 0.0;
-    };
-    return std::abs(step(jump.sample) - 0.5 * (step(jump.sample - 1) + step(jump.sample + 1)));
-  };
-  return *std::ranges::max_element(sources_, {}, excess);
-}
-
-bool Checker::is_source(const std::string& name) const {
-  return std::ranges::find(sources_, name) != sources_.end();
-}
-
-bool Checker::is_sign_flip(std::size_t r, const std::string& name, const Jump& jump) const {
-  const double apart_s =
-      flips_[r]
-          ? std::abs(static_cast<double>(jump.sample) - static_cast<double>(flips_[r]->sample)) /
-                dataset_.sample_rate_Hz()
-          : kNotMeasured;
-  return name == dataset_.target && apart_s < kSameMoment_s;
 }
 
 }  // namespace torsio

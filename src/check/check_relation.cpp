@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "check/checker.hpp"
+#include "check/slow_course.hpp"
 #include "data/finest_step.hpp"
 #include "torsio/core/units.hpp"
 
@@ -253,7 +254,7 @@ int Checker::order_of_difference(std::size_t r) const {
 void Checker::relate() {
   for_each_record([&](std::size_t r) {
     const Recording& recording = dataset_.records[r].recording;
-    changes_[r] = find_relation_change(pairs_[r]);
+    changes_[r] = find_relation_change(pairs_[r], recording.sample_rate_Hz());
     if (recording.has(kJointAngle) &&
         std::ranges::find(spec_.inputs, kJointAngle) == spec_.inputs.end())
       positions_[r] = find_position_effect(pairs_[r], recording.channel(kJointAngle).values);
@@ -269,7 +270,11 @@ void Checker::check_change() {
   pass_unless_found("change", "each recording has the same relation early and late", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       const auto& change = changes_[r];
-      if (spoiled_[r] != 0 || !change) continue;
+      if (spoiled_[r] != 0) continue;
+      if (!change) {
+        check_course(r);
+        continue;
+      }
       const Recording& recording = dataset_.records[r].recording;
       const std::string when = change->is_gradual ? std::string("gradually from beginning to end")
                                                   : fmt::format("at about t = {:.3g} s",
@@ -288,6 +293,21 @@ void Checker::check_change() {
                     {change->sample, recording.channel(dataset_.target).values.size()}});
     }
   });
+}
+
+// A zero that drifts and returns is neither a trend nor a step.
+void Checker::check_course(std::size_t r) {
+  const Recording& recording = dataset_.records[r].recording;
+  if (positions_[r] || (sides_[r] && has_wrong_scale(*sides_[r]))) return;
+  const auto course = find_slow_course(pairs_[r], recording.sample_rate_Hz());
+  if (!course) return;
+  add(Verdict::warn, "change", recording.name(),
+      fmt::format("at equal {} {} changes slowly by {:.3g} {} and returns ({:.2g} % unexplained "
+                  "without that course, {:.2g} % with it)",
+                  spec_.inputs.front(), dataset_.target, course->range, unit_label(dataset_.target),
+                  100.0 * course->unexplained, 100.0 * course->unexplained * course->left),
+      "Check for a zero that drifts, as with the temperature, and for another load that the sensor "
+      "measures. A model would learn the mean.");
 }
 
 // Recordings of one joint have one curve: at common inputs their torques neither differ by a

@@ -11,6 +11,7 @@
 
 #include "check/checker.hpp"
 #include "check/hysteresis_fit.hpp"
+#include "check/mapping_advice.hpp"
 #include "check/signal_faults.hpp"
 #include "data/finest_step.hpp"
 #include "data/mapping/columns.hpp"
@@ -46,14 +47,6 @@ std::string coding_text(const CodedNumbers& coded) {
   return {};
 }
 
-/// The rule of the mapping that makes a channel.
-std::optional<ChannelRule> rule_of(const Recording& recording, const std::string& name) {
-  if (recording.mapping.empty()) return std::nullopt;
-  for (const ChannelRule& rule : parse_mapping(recording.mapping, recording.name()).channels)
-    if (const auto parts = split_channel_name(rule.name); parts && parts->si() == name) return rule;
-  return std::nullopt;
-}
-
 /// What one turn of an encoder is in a channel, also before a gear; empty for other quantities.
 std::vector<double> turns_of(const Recording& recording, const std::string& name) {
   const auto parts = split_channel_name(name);
@@ -67,39 +60,108 @@ std::vector<double> turns_of(const Recording& recording, const std::string& name
   return turns;
 }
 
-/// The mapping line that decodes a channel.
-std::string coding_advice(const Recording& recording, const std::string& name,
-                          const CodedNumbers& coded) {
-  const std::string zero =
-      coded.kind == CodedNumbers::Kind::wrapped
-          ? " The zero is then that of the turn in which a recording begins: give each its zero "
-            "(zero: in the mapping)."
-          : "";
-  if (const auto rule = rule_of(recording, name))
-    if (const auto factor = column_factor(*rule, LogColumn{.name = rule->from, .values = {}}))
-      return fmt::format("Mapping: add {}: {:.9g} to the rule of {}, after its from: {}.{}",
-                         key_of(coded.kind), coded.span / std::abs(*factor), rule->name, rule->from,
-                         zero);
+/// What a decoded channel begins with.
+std::string text_on_zero(const std::string& name, double span) {
+  const auto parts = split_channel_name(name);
+  if (parts && parts->unit->si_suffix == "rad")
+    return "\n         The zero is then that of the turn in which a recording begins: give each "
+           "recording "
+           "its zero (zero: in the mapping).";
   return fmt::format(
-      "Mapping: channels: {{{}: {{from: ..., {}: {:.9g}}}}}, with the column of {} (the number is "
-      "in {}; give it in the "
-      "unit of the column).{}",
-      name, key_of(coded.kind), coded.span, name, unit_label(name), zero);
+      "\n         The first number of a recording is taken as it is: where {0} begins beyond the "
+      "range of "
+      "its "
+      "numbers, add offset: {1:.9g} or offset: -{1:.9g} ({2}) to the same rule.",
+      name, span, unit_label(name));
 }
 
 }  // namespace
+
+namespace {
+
+/// The new values of a channel and their samples.
+struct NewValues {
+  std::vector<std::size_t> samples;
+  std::vector<double> values;
+  explicit NewValues(const Channel& channel) : samples(new_samples(channel)) {
+    for (const std::size_t i : samples) values.push_back(channel.values[i]);
+  }
+};
+
+std::optional<CodedNumbers> coding_of(const Recording& recording, const Channel& channel) {
+  return find_coded_numbers(NewValues(channel).values, finest_step(channel),
+                            turns_of(recording, channel.name));
+}
+
+/// The values, without the wraps that are found in them.
+std::vector<double> unwrapped_values(const Recording& recording, const Channel& channel) {
+  std::vector<double> values = channel.values;
+  const auto coded = coding_of(recording, channel);
+  if (coded && coded->kind == CodedNumbers::Kind::wrapped) unwrap(values, coded->span);
+  return values;
+}
+
+}  // namespace
+
+/// By how many spans the subtrahend of two angles is too low after both are unwrapped, if their difference is much smaller
+/// than that span; not a number if it is not.
+double Checker::spans_between_sources(std::size_t r, double span) const {
+  const int order = order_of_difference(r);
+  if (order == 0) return kNotMeasured;
+  const Recording& recording = dataset_.records[r].recording;
+  std::vector<double> difference =
+      unwrapped_values(recording, recording.channel(sources_[order > 0 ? 0 : 1]));
+  const std::vector<double> subtrahend =
+      unwrapped_values(recording, recording.channel(sources_[order > 0 ? 1 : 0]));
+  for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= subtrahend[i];
+  const Extent extent = extent_of(difference);
+  if (!(extent.width() < kSmallTwist * span)) return kNotMeasured;
+  return std::round(0.5 * (extent.lowest + extent.highest) / span);
+}
+
+/// The mapping line that decodes a channel.
+std::string Checker::coding_advice(std::size_t r, const std::string& name,
+                                   const CodedNumbers& coded) const {
+  const Recording& recording = dataset_.records[r].recording;
+  const auto scale = scale_of_column(recording, name);
+  std::string entries =
+      fmt::format("{}: {:.9g}", key_of(coded.kind), coded.span / scale.value_or(1.0));
+  std::string rest =
+      scale ? std::string()
+            : fmt::format(" ({:.9g} is for a column in {})", coded.span, unit_label(name));
+  if (coded.kind == CodedNumbers::Kind::wrapped) {
+    const double spans = is_source(name) ? spans_between_sources(r, coded.span) : kNotMeasured;
+    const int order = order_of_difference(r);
+    const bool is_subtrahend = order != 0 && name == sources_[order > 0 ? 1 : 0];
+    if (!is_finite(spans)) {
+      rest += text_on_zero(name, coded.span);
+    } else if (spans != 0.0 && is_offset_on(r, name)) {
+      entries += fmt::format(", offset: {:.9g}", (is_subtrahend ? spans : -spans) * coded.span);
+      rest += fmt::format(
+          "\n         The offset (in {}) brings it to the turn of the other angle; another "
+          "recording may "
+          "need another one.",
+          unit_label(name));
+    }
+  }
+  return rule_advice(recording, name, entries) + rest;
+}
+
+/// Whether this one of two angles gets the offset by whole turns: the wrapped one, the subtrahend where both are.
+bool Checker::is_offset_on(std::size_t r, const std::string& name) const {
+  const Recording& recording = dataset_.records[r].recording;
+  const std::string& other = name == sources_[0] ? sources_[1] : sources_[0];
+  const bool is_subtrahend = name == sources_[order_of_difference(r) > 0 ? 1 : 0];
+  return is_subtrahend || !coding_of(recording, recording.channel(other));
+}
 
 void Checker::check_coding() {
   pass_unless_found("coding", "no channel jumps again and again by the same amount", [&] {
     for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
       if (is_condition(recording, channel.name)) return;
-      std::vector<std::size_t> samples;
-      std::vector<double> values;
-      for (const std::size_t i : new_samples(channel))
-        samples.push_back(i), values.push_back(channel.values[i]);
-      const auto coded =
-          find_coded_numbers(values, finest_step(channel), turns_of(recording, channel.name));
+      const auto coded = coding_of(recording, channel);
       if (!coded) return;
+      const std::vector<std::size_t> samples = new_samples(channel);
       spoiled_[r] = 1;
       coded_[r] = 1;
       const std::size_t first = samples[coded->first];
@@ -110,7 +172,7 @@ void Checker::check_coding() {
               : fmt::format("{} jumps {} times by {:.6g} {}{}; the first time at t = {:.4g} s",
                             channel.name, coded->jumps, coded->span, unit_label(channel.name),
                             coding_text(*coded), recording.time_s(first)),
-          coding_advice(recording, channel.name, *coded), {{first, first + 1}});
+          coding_advice(r, channel.name, *coded), {{first, first + 1}});
     });
   });
 }

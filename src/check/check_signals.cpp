@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -171,16 +172,29 @@ void Checker::check_repeats() {
       const auto rows =
           std::max(kRepeatRows,
                    static_cast<std::size_t>(std::round(kRepeat_s * recording.sample_rate_Hz())));
-      const auto repeat = find_repeat(channels, rows);
-      if (!repeat) return;
-      add(Verdict::warn, "repeats", recording.name(),
-          fmt::format(
+      const std::vector<RepeatedBlock> repeats = find_repeats(channels, rows);
+      if (repeats.empty()) return;
+      constexpr std::size_t kMaxNamed = 4;
+      std::vector<std::string> texts;
+      std::vector<SampleRange> places;
+      for (const RepeatedBlock& repeat : repeats) {
+        places.push_back({repeat.again, repeat.again + repeat.length});
+        if (texts.size() < kMaxNamed)
+          texts.push_back(fmt::format(
               "the rows from t = {:.4g} s on occur again from t = {:.4g} s on, for {:.3g} s",
-              recording.time_s(repeat->first), recording.time_s(repeat->again),
-              static_cast<double>(repeat->length) / recording.sample_rate_Hz()),
-          "No sensor repeats its noise: check the logger for a buffer that was written twice, and "
-          "cut the second one out.",
-          {{repeat->again, repeat->again + repeat->length}});
+              recording.time_s(repeat.first), recording.time_s(repeat.again),
+              static_cast<double>(repeat.length) / recording.sample_rate_Hz()));
+      }
+      if (repeats.size() > kMaxNamed)
+        texts.push_back(fmt::format("{} more blocks", repeats.size() - kMaxNamed));
+      add(Verdict::warn, "repeats", recording.name(), fmt::format("{}", fmt::join(texts, "; ")),
+          repeats.size() == 1 ? "No sensor repeats its noise: check the logger for a buffer that "
+                                "was written twice, "
+                                "and cut the second one out."
+                              : "No sensor repeats its noise: check the logger for buffers that "
+                                "were written twice, "
+                                "and cut the second one of each out.",
+          std::move(places));
     });
   });
 }

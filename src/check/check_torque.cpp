@@ -39,9 +39,10 @@ void Checker::check_limit(std::size_t r) {
   for (const Rest& rest : limit->samples) places.push_back({rest.begin, rest.end});
   add(Verdict::warn, "saturation", recording.name(),
       fmt::format(
-          "{} ends {} times at {:.4g} {} within its noise while {} continues, by up to {:.3g} {}",
+          "{0} stops {1} times at {2:.4g} {3}, within its noise, although {4} moves on: without a "
+          "limit it would have changed by up to {5:.3g} {3} more",
           dataset_.target, limit->visits, limit->level, unit_label(dataset_.target),
-          spec_.inputs.front(), limit->hidden, unit_label(dataset_.target)),
+          spec_.inputs.front(), limit->hidden),
       "If that is the limit of the sensor or its amplifier, cut those parts out or use a larger "
       "range; a clutch that slips has such a limit, too.",
       std::move(places));

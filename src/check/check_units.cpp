@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "check/checker.hpp"
+#include "check/mapping_advice.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -28,18 +29,60 @@ bool is_on_output_side(std::string_view channel) {
       [&](std::string_view word) { return channel.find(word) != std::string_view::npos; });
 }
 
-/// What to do where one of two angles moves `ratio` times as far as the other one, by a gear.
-std::string gear_advice(const std::string& further, const std::string& other, double ratio) {
-  if (is_on_output_side(further) && !is_on_output_side(other))
+/// The line with the scale of a channel multiplied by `factor`.
+std::string scale_line(const Recording& recording, const std::string& name, double factor) {
+  const auto rule = rule_of(recording, name);
+  if (!rule || rule->scale == 1.0)
+    return rule_advice(recording, name, fmt::format("scale: {:.6g}", factor));
+  return fmt::format("Mapping: write scale: {:.9g} instead of {:.9g} into the rule of {}.",
+                     factor * rule->scale, rule->scale, rule->name);
+}
+
+/// A ratio near a power of two is one.
+double ratio_of_codes(double ratio) {
+  constexpr double kNearPower = 0.02;
+  const double power = std::exp2(std::round(std::log2(ratio)));
+  return std::abs(ratio / power - 1.0) < kNearPower ? power : ratio;
+}
+
+/// What to do where one of two angles moves `ratio` times as far as the other one, and no unit has that factor.
+std::string ratio_advice(const Recording& recording, const std::string& further,
+                         const std::string& other, double ratio) {
+  const auto rule_of_further = rule_of(recording, further);
+  const auto rule_of_other = rule_of(recording, other);
+  const bool has_ratio = rule_of_other && rule_of_other->gear_ratio != 1.0;
+  const bool has_scale = (rule_of_further && rule_of_further->scale != 1.0) ||
+                         (rule_of_other && rule_of_other->scale != 1.0);
+  const double codes = ratio_of_codes(ratio);
+  const bool is_before_gear = !is_on_output_side(further) || is_on_output_side(other);
+  if (is_before_gear && !has_scale)
     return fmt::format(
-        "That is the ratio of a gear, by which {0} was divided once too often: remove gear_ratio: "
-        "from its rule in the mapping, or if the drive divides by it twice, multiply:  channels: "
-        "{{{0}: {{from: ..., scale: {1:.3g}}}}}",
-        other, ratio);
-  return fmt::format(
-      "That is as far as before a gear of about {1:.3g}: write its ratio in a mapping, with the "
-      "column of {0}:  channels: {{{0}: {{from: ..., gear_ratio: {1:.3g}}}}}",
-      further, ratio);
+        "That is as far as before a gear of about {1:.3g}: write its ratio in a mapping, with the "
+        "column of {0}:  channels: {{{0}: {{from: ..., gear_ratio: {1:.3g}}}}}",
+        further, ratio);
+  std::string advice =
+      "One of the two angles is wrong by that factor, and the recording does not "
+      "show which one.";
+  if (std::exp2(std::round(std::log2(codes))) == codes)
+    advice +=
+        " A power of two is that of encoders with another number of bits: compare the counts "
+        "of a turn in their data sheets with the scales.";
+  advice += fmt::format("\n         If {} moves too far:  {}", further,
+                        scale_line(recording, further, 1.0 / codes));
+  advice += has_ratio
+                ? fmt::format(
+                      "\n         If {0} was divided by its gear ratio once too often: remove "
+                      "gear_ratio: from the rule of {0}.",
+                      other)
+                : fmt::format(
+                      "\n         If {} does not move far enough, as where it was divided by "
+                      "a gear ratio once too often:  {}",
+                      other, scale_line(recording, other, codes));
+  if (is_before_gear)
+    advice +=
+        fmt::format("\n         If {} is before a gear:  {}", further,
+                    rule_advice(recording, further, fmt::format("gear_ratio: {:.3g}", ratio)));
+  return advice;
 }
 
 }  // namespace
@@ -50,6 +93,7 @@ void Checker::check_units() {
   pass_unless_found("units", "the recordings agree", [&] {
     for_each_record([&](std::size_t r) {
       check_units_within(r);
+      if (coded_[r] == 0) check_rates_of(r);
       if (spoiled_[r] == 0 && !changes_[r] && !positions_[r]) check_scale(r);
       if (spoiled_[r] == 0) check_twist(r);
     });
@@ -142,7 +186,8 @@ void Checker::check_units_within(std::size_t r) {
   add(Verdict::fail, "units", recording.name(),
       fmt::format("{} moves {:.4g} times as far as {}", further, ratio, other),
       mistake.empty()
-          ? gear_advice(further, other, sides_[r] ? ratio_of(1.0 + sides_[r]->excess, 1.0) : ratio)
+          ? ratio_advice(recording, further, other,
+                         sides_[r] ? ratio_of(1.0 + sides_[r]->excess, 1.0) : ratio)
           : fmt::format("That is the factor between {}: specify the column's unit in its name or "
                         "with unit: in a mapping.",
                         mistake));
@@ -179,13 +224,31 @@ void Checker::check_twist(std::size_t r) {
   if (!is_angle(sources_.front())) return;
   if (order_of_difference(r) == 0 && spec_.inputs.front() != "spring_deflection_rad") return;
   const double width = inner_range(pairs_[r].input);
-  if (width < kWidestTwist_rad) return;
+  if (width < kWidestTwist_rad) return check_turns_between(r);
   spoiled_[r] = 1;
   add(Verdict::warn, "units", dataset_.records[r].recording.name(),
       fmt::format("{} ranges through {:.3g} rad, {:.2g} turns", spec_.inputs.front(), width,
                   width / (2.0 * std::numbers::pi)),
       "No spring of a joint twists so far: check the unit of the angles, their gear ratio, a wrap "
       "by one turn, and whether two columns were interchanged.");
+}
+
+// An encoder of one turn that began on another turn than the other one.
+void Checker::check_turns_between(std::size_t r) {
+  const int order = order_of_difference(r);
+  if (order == 0) return;
+  const Extent extent = extent_of(pairs_[r].input);
+  const double middle = 0.5 * (extent.lowest + extent.highest);
+  constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+  const double turns = std::round(middle / kTurn_rad);
+  if (turns == 0.0 || std::abs(middle - turns * kTurn_rad) > kLargestZero_rad) return;
+  const Recording& recording = dataset_.records[r].recording;
+  const std::string& subtrahend = sources_[order > 0 ? 1 : 0];
+  add(Verdict::warn, "units", recording.name(),
+      fmt::format("{} is near {:.4g} rad throughout, {:g} whole turn{} and not 0",
+                  spec_.inputs.front(), middle, std::abs(turns), std::abs(turns) == 1.0 ? "" : "s"),
+      "One of the two encoders began on another turn. " +
+          rule_advice(recording, subtrahend, fmt::format("offset: {:.9g}", turns * kTurn_rad)));
 }
 
 // The sensors of both sides of a spring turn by the same angle, apart from the deflection.

@@ -15,6 +15,7 @@
 #include "check/signal_pair.hpp"
 #include "check/torque_faults.hpp"
 #include "check/torque_relation.hpp"
+#include "data/mapping/number_coding.hpp"
 #include "torsio/check/check.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -91,6 +92,9 @@ class Checker {
   void run_checks(bool with_warnings);
   void check_ends();
   void check_length();
+  void check_clock();
+  void check_rates_of(std::size_t r);
+  void report_rate(std::size_t r, const std::string& name, double factor, double together);
   void check_missing();
   void check_constant();
   void check_saturation();
@@ -106,6 +110,10 @@ class Checker {
   void leave_out(std::size_t r, const Rest& rest);
   [[nodiscard]] bool is_end_of_stall(std::size_t r, std::size_t sample) const;
   void check_coding();
+  [[nodiscard]] std::string coding_advice(std::size_t r, const std::string& name,
+                                          const CodedNumbers& coded) const;
+  [[nodiscard]] double spans_between_sources(std::size_t r, double span) const;
+  [[nodiscard]] bool is_offset_on(std::size_t r, const std::string& name) const;
   void check_held();
   void check_switched_off();
   [[nodiscard]] bool has_lost_sign(std::size_t r);
@@ -132,6 +140,7 @@ class Checker {
   void check_units();
   [[nodiscard]] static double inner_range(const std::vector<double>& values);
   void check_twist(std::size_t r);
+  void check_turns_between(std::size_t r);
   void check_load(std::size_t r);
   void check_scale(std::size_t r);
   void compare_slopes();
@@ -145,6 +154,11 @@ class Checker {
   [[nodiscard]] static bool stands_out(const Jump& jump, const std::vector<double>& values);
   void check_gaps(bool with_warnings);
   void check_jump_of_input(std::size_t r);
+  [[nodiscard]] bool check_jumps(std::size_t r, const Channel& channel,
+                                 const std::vector<std::size_t>& samples,
+                                 const std::vector<double>& values);
+  [[nodiscard]] bool check_jumps_of_input(std::size_t r);
+  [[nodiscard]] bool check_dropouts(std::size_t r, const Channel& channel);
   [[nodiscard]] static std::string jump_text(const Recording& recording, const std::string& name,
                                              const Jump& jump);
   [[nodiscard]] const std::string& source_of(const Recording& recording, const Jump& jump) const;
@@ -160,6 +174,7 @@ class Checker {
   [[nodiscard]] int order_of_difference(std::size_t r) const;
   void relate();
   void check_change();
+  void check_course(std::size_t r);
   void check_excitation();
   void check_offsets();
   void report_line(std::size_t r, const RecordLine& line, double spread);
@@ -206,6 +221,9 @@ class Checker {
   static constexpr double kRepeat_s = 0.25;
   static constexpr std::size_t kRepeatRows = 50;
   static constexpr double kWidestTwist_rad = 1.5;
+  static constexpr double kSmallTwist = 0.25;  ///< share of a turn
+  static constexpr double kLargestZero_rad =
+      0.3;  ///< a deflection that is a whole turn off is as near to it
   static constexpr double kHighestLoad_Nm = 3000.0;
   static constexpr double kOuter = 0.01;          ///< share of the samples on either side
   static constexpr double kOtherExplained = 0.3;  ///< share of what is unexplained of the target

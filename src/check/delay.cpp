@@ -23,6 +23,7 @@ constexpr std::size_t kEnoughSamples = 8000;
 constexpr double kExplainsLittle = 0.2;  ///< share of the variance: there is no delay to find
 constexpr double kShare = 0.75;          ///< share of what is unexplained without shift
 constexpr double kEarlyShare = 0.3;
+constexpr double kLeastGain = 3e-4;  ///< share of the variance: a friction explains less, too
 constexpr double kLongLag_s = 0.2;
 constexpr double kEarlyRest = 0.01;
 constexpr double kHeldOutShare = 0.6;
@@ -69,9 +70,10 @@ double greatest_share(double lag_s) {
 
 double shortest_lag_s(double sample_rate_Hz) { return std::max(kShortest_s, 1.5 / sample_rate_Hz); }
 
-/// Whether the shift also explains parts that were not used for the fit.
+/// Whether the shift explains what friction would not, also in parts that were not used for the fit.
 bool is_held_out(const Delay& delay) {
-  return delay.held_out_share <= kHeldOutShare && delay.better_parts >= kLeastParts;
+  return delay.without_shift - delay.unexplained >= kLeastGain &&
+         delay.held_out_share <= kHeldOutShare && delay.better_parts >= kLeastParts;
 }
 
 /// The columns of a dissipative spring over the input: the first kFree are a drift and a static curve, the

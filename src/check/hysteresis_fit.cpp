@@ -44,6 +44,28 @@ Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,
   return columns;
 }
 
+Eigen::MatrixXd relaxation_columns(const std::vector<double>& input,
+                                   std::span<const std::size_t> samples, double sample_rate_Hz) {
+  constexpr auto kTimeConstants_s = std::to_array<double>({0.02, 0.07, 0.2, 0.7, 2.0, 7.0, 20.0});
+  Eigen::MatrixXd columns(static_cast<Eigen::Index>(samples.size()),
+                          static_cast<Eigen::Index>(kTimeConstants_s.size()));
+  std::array<double, kTimeConstants_s.size()> slow{};
+  double last = kNotMeasured;
+  std::size_t i = 0;
+  for (std::size_t row = 0; row < samples.size(); ++row) {
+    for (; i <= samples[row]; ++i) {
+      if (!is_finite(input[i])) continue;
+      if (!is_finite(last)) slow.fill(input[i]);
+      last = input[i];
+      for (std::size_t k = 0; k < slow.size(); ++k)
+        slow[k] -= std::expm1(-1.0 / (kTimeConstants_s[k] * sample_rate_Hz)) * (last - slow[k]);
+    }
+    for (std::size_t k = 0; k < slow.size(); ++k)
+      columns(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(k)) = last - slow[k];
+  }
+  return columns;
+}
+
 std::vector<std::size_t> samples_for_fit(const std::vector<double>& signal, std::size_t begin,
                                          std::size_t end, std::size_t enough) {
   std::vector<std::size_t> samples;

@@ -28,6 +28,12 @@ inline constexpr Eigen::Index kStaticColumns = 10;
   return hysteresis_columns(signal, samples, extent_of(signal));
 }
 
+/// The input minus low-passes of it of first order, with time constants from 0.02 to 20 s: what a spring that relaxes adds
+/// to a torque. They are larger in a faster motion.
+[[nodiscard]] Eigen::MatrixXd relaxation_columns(const std::vector<double>& input,
+                                                 std::span<const std::size_t> samples,
+                                                 double sample_rate_Hz);
+
 /// So many samples determine the columns.
 inline constexpr std::size_t kSamplesOfAFit = 10000;
 

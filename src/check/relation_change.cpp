@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <span>
@@ -12,6 +13,7 @@
 
 #include "check/hysteresis_fit.hpp"
 #include "check/torque_relation.hpp"
+#include "numerics/nnls.hpp"
 #include "numerics/reversals.hpp"
 
 namespace torsio {
@@ -120,6 +122,23 @@ class Course {
 
   /// Share of the variance of the target that a fit without a change leaves.
   [[nodiscard]] double unexplained() const { return unexplained_; }
+
+  /// Square sum that remains of the rest with columns whose coefficients are not negative, as a share of it.
+  [[nodiscard]] double left_by(const Eigen::MatrixXd& others) const {
+    const Eigen::Index count = others.cols();
+    Eigen::MatrixXd extra(rest_.size(), count);
+    for (Eigen::Index k = 0; k < count; ++k) extra.col(k) = columns_.residual(others.col(k));
+    NormalEquations equations(static_cast<std::size_t>(count));
+    const Eigen::MatrixXd product = extra.transpose() * extra;
+    const Eigen::VectorXd projection = extra.transpose() * rest_;
+    equations.product.values.assign(product.data(), product.data() + product.size());
+    equations.projection.assign(projection.begin(), projection.end());
+    equations.square = rest_.squaredNorm();
+    if (!(equations.square > 0.0)) return 1.0;
+    const std::vector<std::uint8_t> is_free(static_cast<std::size_t>(count), 0);
+    return equations.error(non_negative_least_squares(equations, is_free).coefficients) /
+           equations.square;
+  }
 
   [[nodiscard]] Explained explained_by(const Eigen::VectorXd& course) const {
     Eigen::MatrixXd extra(rest_.size(), 2);
@@ -257,7 +276,7 @@ double passed_elsewhere(const Eigen::MatrixXd& columns, const Eigen::VectorXd& t
 
 }  // namespace
 
-std::optional<RelationChange> find_relation_change(const Pair& pair) {
+std::optional<RelationChange> find_relation_change(const Pair& pair, double sample_rate_Hz) {
   const std::size_t reversals = count_reversals(pair.input);
   if (correlation(pair.input, pair.target) < kClearCorrelation || reversals < kFewestReversals)
     return {};
@@ -290,7 +309,11 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
   const double by_offset =
       std::abs(change.offset) / (kOffsetShare * extent_of(pair.target).width());
   change.is_of_slope = by_slope > by_offset;
-  return std::max(by_slope, by_offset) >= 1.0 ? std::optional(change) : std::nullopt;
+  if (std::max(by_slope, by_offset) < 1.0) return {};
+  if (change.is_of_slope && course.left_by(relaxation_columns(
+                                pair.input, samples, sample_rate_Hz)) <= best.explained.share)
+    return {};
+  return change;
 }
 
 std::optional<SwitchedOff> find_switched_off(const Pair& pair) {

@@ -24,8 +24,10 @@ struct RelationChange {
 /// by more than 12 % are reported; empty if the torque does not follow the input or the motion does not
 /// reverse on both sides of the step. Where the late motion does not repeat the early one over a fifth of the input's
 /// range, offset and slope are those of the fit, and only a change that explains 1 % of the torque's variance is
-/// reported.
-[[nodiscard]] std::optional<RelationChange> find_relation_change(const Pair& pair);
+/// reported. A slope that changes with the rate of the motion, as that of a spring that relaxes, is none: relaxations
+/// with time constants from 0.02 to 20 s explain it at least as well.
+[[nodiscard]] std::optional<RelationChange> find_relation_change(const Pair& pair,
+                                                                 double sample_rate_Hz);
 
 /// A part of a recording in which the target hardly changes, although it follows the input elsewhere.
 struct SwitchedOff {

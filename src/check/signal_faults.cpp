@@ -28,6 +28,7 @@ constexpr double kOverAround = 6.0;
 constexpr double kNeighboursAgree = 0.3;  ///< share of the spike's height
 constexpr std::size_t kHashedRows = 16;
 constexpr std::size_t kFewDistinctRows = 20;
+constexpr double kEqualShare = 1e-9;  ///< share of the range within which values are equal
 constexpr double kCutQuantile = 0.999;
 constexpr double kOverQuantile = 3.0;
 constexpr std::size_t kCutNeighbourhood = 8;
@@ -225,16 +226,24 @@ std::optional<ReturningValue> find_returning_value(const Channel& channel, doubl
   return {};
 }
 
-std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& channels,
-                                         std::size_t shortest) {
+std::vector<RepeatedBlock> find_repeats(const std::vector<const Channel*>& channels,
+                                        std::size_t shortest) {
   if (channels.empty()) return {};
   const std::size_t rows = channels.front()->values.size();
   std::vector<std::uint64_t> row(rows, 0);
-  for (const Channel* channel : channels)
-    for (std::size_t i = 0; i < rows; ++i)
-      row[i] = mixed(row[i], std::bit_cast<std::uint64_t>(channel->values[i]));
+  for (const Channel* channel : channels) {
+    // Rows that were resampled at their own stamps differ by their rounding.
+    const double digit = kEqualShare * extent_of(channel->values).width();
+    for (std::size_t i = 0; i < rows; ++i) {
+      const double value = channel->values[i];
+      const double rounded =
+          digit > 0.0 && is_finite(value) ? std::round(value / digit) + 0.0 : value;
+      row[i] = mixed(row[i], std::bit_cast<std::uint64_t>(rounded));
+    }
+  }
   std::unordered_map<std::uint64_t, std::size_t> first;  // rows where the blocks begin
-  RepeatedBlock longest;
+  std::vector<RepeatedBlock> repeats;
+  std::size_t next = 0;  // after the last repeat
   for (std::size_t i = 0; i + kHashedRows <= rows; ++i) {
     std::uint64_t block = 0;
     bool is_at_rest = true;
@@ -248,17 +257,22 @@ std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& chan
       if (i % kHashedRows == 0) first.emplace(block, i);
       continue;
     }
-    if (i < longest.again + longest.length) continue;
+    if (i < next) continue;
     RepeatedBlock found{.first = at->second, .again = i};
+    // The blocks are hashed at every n-th row: the repeat may begin before.
+    while (found.first > 0 && found.again > next && row[found.first - 1] == row[found.again - 1])
+      --found.first, --found.again, ++found.length;
     std::size_t distinct = 0;
-    while (i + found.length < rows && found.first + found.length < i &&
-           row[found.first + found.length] == row[i + found.length]) {
-      if (found.length > 0 && row[i + found.length] != row[i + found.length - 1]) ++distinct;
+    while (found.again + found.length < rows && found.first + found.length < found.again &&
+           row[found.first + found.length] == row[found.again + found.length])
       ++found.length;
-    }
-    if (distinct >= kFewDistinctRows && found.length > longest.length) longest = found;
+    for (std::size_t k = found.again + 1; k < found.again + found.length; ++k)
+      if (row[k] != row[k - 1]) ++distinct;
+    if (distinct < kFewDistinctRows || found.length < shortest) continue;
+    next = found.again + found.length;
+    repeats.push_back(found);
   }
-  return longest.length >= shortest ? std::optional(longest) : std::nullopt;
+  return repeats;
 }
 
 std::optional<Cut> find_cut(const std::vector<const Channel*>& channels,

@@ -53,9 +53,9 @@ struct RepeatedBlock {
   std::size_t again = 0;
   std::size_t length = 0;
 };
-/// The longest one of at least `shortest` rows; rows at rest do not count.
-[[nodiscard]] std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& channels,
-                                                       std::size_t shortest);
+/// Blocks of at least `shortest` rows, in the order of time; rows at rest do not count.
+[[nodiscard]] std::vector<RepeatedBlock> find_repeats(const std::vector<const Channel*>& channels,
+                                                      std::size_t shortest);
 
 /// Rows that are missing before a sample.
 struct Cut {

@@ -155,6 +155,22 @@ TEST(Csv, OneNumberProvesWhatTheCommasOfAFileAre) {
   EXPECT_NE(quoted.notes[0].find("commas are read as marks between thousands"), std::string::npos);
 }
 
+TEST(Csv, ApostrophesAndNarrowSpacesMaySeparateThousands) {
+  for (const std::string mark : {"'", "\u2019", "\u202f", "\u00a0", "\u2009", "\xa0"}) {
+    EXPECT_EQ(first_column("-1" + mark + "396,75;1\n419,86;1\n"), (std::vector{-1396.75, 419.86}))
+        << mark;
+    EXPECT_EQ(first_column("12" + mark + "345" + mark + "678;1\n1" + mark + "234.5;1\n"),
+              (std::vector{12345678.0, 1234.5}))
+        << mark;
+    for (const std::string& other : {"1" + mark + "39", "1" + mark + "3961", "1234" + mark + "567",
+                                     mark + "396", "0" + mark + "396", "1" + mark + "396e3"})
+      EXPECT_THROW((void)first_column(other + ";1\n"), Error) << other;
+  }
+  const LogTable table = parse_csv("a_1;b_1\n1'396.5;2\n", "a.csv");
+  ASSERT_EQ(table.notes.size(), 1U);
+  EXPECT_NE(table.notes[0].find("'1'396.5'"), std::string::npos) << table.notes[0];
+}
+
 TEST(Csv, ANumberMustFitTheMarkThatIsStated) {
   EXPECT_THROW((void)first_column("1,5;1\n", {.decimal = "point"}), Error);
   EXPECT_THROW((void)first_column("0.5;1\n", {.decimal = "comma"}), Error);

@@ -31,6 +31,13 @@ struct Channel {
   }
 };
 
+/// The column of a file that a channel was read from.
+struct ColumnOfChannel {
+  std::string channel;
+  std::string column;
+  std::string unit;  ///< suffix of the unit that its numbers were read in
+};
+
 /// Channels by name on one uniform clock. All channels have `size()` samples; names are unique.
 class Recording {
  public:
@@ -66,6 +73,8 @@ class Recording {
   /// back to measured ones.
   std::vector<ChannelDefinition> definitions;
   std::vector<ZeroRule> zeros;  ///< already applied to the values
+  /// For advice on a mapping; the clock is `t_s`. Empty for a recording that was not read from a file.
+  std::vector<ColumnOfChannel> columns;
   std::string mapping;  ///< `mapping_text` of the mapping that it was read with; empty: none
   std::vector<std::string> notes;  ///< what reading the file assumed, in sentences
   std::vector<std::string>

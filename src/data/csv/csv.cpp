@@ -129,6 +129,9 @@ class TableParser {
   void finish() {
     marks_.finish(columns_, rows_);
     if (const std::string note = marks_.note(); !note.empty()) table_.notes.push_back(note);
+    if (!with_thousands_marks_.empty())
+      table_.notes.push_back(fmt::format("marks between thousands are read, for example in '{}'",
+                                         printable(with_thousands_marks_)));
     finish_times();
     std::vector<std::string> left_out;
     std::vector<std::string> nameless;
@@ -241,6 +244,11 @@ class TableParser {
     if (const auto stamp = time_stamp(cell)) return add_time(*stamp, line, index);
     double code = 0.0;
     if (read_hexadecimal(cell, code)) return unless_missing(code, cell, index);
+    if (const std::string usual = without_thousands_marks(cell);
+        !usual.empty() && MarkedNumber(usual).is_number()) {
+      if (with_thousands_marks_.empty()) with_thousands_marks_ = cell;
+      return unless_missing(marked_number(usual, line, index), cell, index);
+    }
     if (const std::string usual = usual_spelling(cell);
         !usual.empty() && MarkedNumber(usual).is_number())
       return unless_missing(marked_number(usual, line, index), cell, index);
@@ -370,6 +378,7 @@ class TableParser {
   std::size_t last_line_ = 0;
   std::size_t header_again_ = 0;  ///< its first line; 0: none
   DecimalMarks marks_;
+  std::string with_thousands_marks_;  ///< the first cell with an apostrophe or a space between them
   bool has_local_times_ = false;
   bool has_empty_ends_ = false;
 };

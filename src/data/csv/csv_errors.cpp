@@ -33,8 +33,9 @@ std::string advice_on_cell(std::string_view cell, std::string_view column) {
     return "Export the log again without marks between thousands, or correct the cell.";
   return fmt::format(
       "If that is what is written where nothing was measured, write in a mapping  missing: "
-      "[{}]\n  A column of texts is left out by  drop: [{}]\n  If it names the joint that a row is "
-      "of, write the rows of each joint to a file of their own, by a text filter.",
+      "[{}]\n  A column of texts is left out by  drop: [{}]\n  If each row belongs to one joint, "
+      "which this "
+      "column names, write a file for each joint first.",
       yaml_name(cell), yaml_name(column));
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
@@ -66,6 +68,34 @@ enum class DecimalMark : unsigned char { unknown, point, comma };
     is_other = true;
   }
   return is_other ? text : std::string();
+}
+
+/// A number in which groups of three digits are separated by an apostrophe, a no-break space or a thin space, without
+/// these marks; nothing if it has none, or they are elsewhere.
+[[nodiscard]] inline std::string without_thousands_marks(std::string_view cell) {
+  constexpr std::array<std::string_view, 6> kMarks{
+      "'", "\xe2\x80\x99", "\xe2\x80\xaf", "\xe2\x80\x89", "\xc2\xa0", "\xa0"};
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  for (const std::string_view mark : kMarks) {
+    auto at = cell.find(mark);
+    if (at == std::string_view::npos) continue;
+    const std::size_t first = cell.find_first_not_of("+-");
+    if (first > 1 || at == first || at > first + 3 || cell[first] == '0') return {};
+    std::string text(cell.substr(0, at));
+    while (at < cell.size() && cell.substr(at).starts_with(mark)) {
+      const std::string_view group = cell.substr(at + mark.size(), 3);
+      if (group.size() < 3 || !std::ranges::all_of(group, is_digit)) return {};
+      text += group;
+      at += mark.size() + 3;
+    }
+    const std::string_view rest = cell.substr(at);
+    if (!std::ranges::all_of(text.substr(first), is_digit) ||
+        (!rest.empty() && rest.front() != '.' && rest.front() != ',') ||
+        rest.find_first_not_of(".,0123456789") != std::string_view::npos)
+      return {};
+    return text + std::string(rest);
+  }
+  return {};
 }
 
 /// A whole number in hexadecimal digits, such as 0x1F or -0x1f.

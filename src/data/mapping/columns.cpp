@@ -287,6 +287,27 @@ std::optional<double> column_factor(const ChannelRule& rule, const LogColumn& co
   return factor_of(rule, *name->unit) * unit->scale;
 }
 
+std::vector<ColumnOfChannel> columns_of_channels(const TableChannels& columns,
+                                                 const Mapping& mapping) {
+  std::vector<ColumnOfChannel> named;
+  const auto add = [&](const TableChannel& made, std::string channel) {
+    if (made.column == nullptr) return;
+    const auto rule = std::ranges::find_if(mapping.channels, [&](const ChannelRule& each) {
+      const auto name = split_channel_name(each.name);
+      return each.from == made.column->name && name && name->si() == made.channel.name;
+    });
+    const std::string full_name = made.column->full_name();
+    const auto name = split_channel_name(rule != mapping.channels.end() ? rule->name : full_name);
+    const Unit* unit = name ? name->unit : nullptr;
+    if (rule != mapping.channels.end()) unit = unit_of_source(*rule, *made.column, unit);
+    named.push_back({std::move(channel), made.column->name,
+                     unit != nullptr ? std::string(unit->suffix) : std::string()});
+  };
+  if (columns.clock) add(*columns.clock, "t_s");
+  for (const TableChannel& made : columns.channels) add(made, made.channel.name);
+  return named;
+}
+
 std::string_view marked_quantity(std::string_view name) noexcept {
   constexpr std::string_view kFreshEnding = "_fresh_1";
   return name.ends_with(kFreshEnding) ? name.substr(0, name.size() - kFreshEnding.size())

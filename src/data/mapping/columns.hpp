@@ -33,6 +33,10 @@ struct TableChannels {
 [[nodiscard]] std::optional<double> column_factor(const ChannelRule& rule,
                                                   const LogColumn& column) noexcept;
 
+/// The columns that the channels and the clock were read from, with the units of their numbers.
+[[nodiscard]] std::vector<ColumnOfChannel> columns_of_channels(const TableChannels& columns,
+                                                               const Mapping& mapping);
+
 /// "torque" of "torque_fresh_1", a mask of new samples; empty if the name is none of a mask.
 [[nodiscard]] std::string_view marked_quantity(std::string_view name) noexcept;
 

@@ -250,6 +250,7 @@ Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows 
   run.rows = rows_with_held_values(columns, run, mapping);
   const std::size_t trimmed = run.rows.begin - all_rows.begin;
   const RecordClock clock = record_clock(table, columns, run.rows, mapping, rate_Hz);
+  std::vector<ColumnOfChannel> named = columns_of_channels(columns, mapping);
   std::vector<Channel> channels;
   for (TableChannel& column : columns.channels) channels.push_back(cut(column.channel, all_rows));
   for (const std::string& name : mapping.hold)
@@ -279,6 +280,7 @@ Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows 
   Recording recording(run.name, clock.sample_rate_Hz, clock.start_s);
   recording.source = table.source;
   recording.zeros = mapping.zero;
+  recording.columns = std::move(named);
   recording.notes = table.notes;
   recording.not_read = table.not_read;
   if (trimmed > 0)
