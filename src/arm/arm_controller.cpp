@@ -38,7 +38,7 @@ constexpr std::array kChannels{ChannelOfSample{"motor_angle_rad", &JointSample::
                                ChannelOfSample{"motor_current_A", &JointSample::motor_current_A}};
 
 double JointSample::*channel_of(std::string_view name) {
-  const auto found = std::ranges::find(kChannels, name, &ChannelOfSample::name);
+  const auto* const found = std::ranges::find(kChannels, name, &ChannelOfSample::name);
   if (found == kChannels.end())
     throw Error({.place = fmt::format("{}: monitor", kPlace),
                  .expected = "the channels motor_angle_rad, gear_angle_rad, joint_angle_rad and "

@@ -200,13 +200,13 @@ class Reader {
     throw Error(
         {.place = attributes.place(),
          .problem = fmt::format("joint '{}' is neither revolute nor fixed", shown(joint.name)),
-         .expected = "type=\"revolute\" or type=\"fixed\"",
+         .expected = R"(type="revolute" or type="fixed")",
          .found = fmt::format("'{}'", shown(type)),
-         .advice = type == "continuous"
-                       ? "Make it revolute with the limits of its motion, for example "
-                         "lower=\"-6.28\" upper=\"6.28\"."
-                       : "An arm here has joints that turn; make this one fixed if it does "
-                         "not move."});
+         .advice =
+             type == "continuous"
+                 ? R"(Make it revolute with the limits of its motion, as lower="-6.28" upper="6.28".)"
+                 : "An arm here has joints that turn; make this one fixed if it does "
+                   "not move."});
   }
   void in_link(const Attributes& attributes, unsigned long line) {
     UrdfLink& link = elements_.links.back();

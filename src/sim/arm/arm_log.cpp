@@ -111,7 +111,7 @@ void ArmLog::finish(ArmRun& run) && {
     const std::string before = prefix(joint.score.joint);
     for (std::size_t i = 0; i < joint.sensed.size(); ++i) {
       Channel channel{.name = joint.sensed[i].name, .values = std::move(joint.sensed[i].values)};
-      if (i + 1 == joint.sensed.size()) channel.fresh = std::move(joint.torque_fresh);
+      if (i + 1 == joint.sensed.size()) channel.fresh = joint.torque_fresh;  // the torque's
       run.record.add({.name = before + channel.name, .values = channel.values});
       own.add(std::move(channel));
     }
