@@ -19,6 +19,7 @@ namespace {
 constexpr double kGravity_m_s2 = 9.81;
 constexpr double kLargestAngle_rad = 1e3;  // sines of larger ones lose digits
 constexpr double kUnitTolerance = 1e-6;
+constexpr double kLargestMass_kg = 1e6;  // far above any arm; torques of larger ones overflow
 
 bool all_finite(std::span<const double> values) {
   return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
@@ -73,8 +74,8 @@ class JointCheck {
   }
   void inertia() const {
     const BodyInertia& body = joint_.body;
-    require(body.mass_kg > 0.0 && std::isfinite(body.mass_kg), {place_, "mass"},
-            "a positive number of kg", body.mass_kg);
+    require(body.mass_kg > 0.0 && body.mass_kg <= kLargestMass_kg, {place_, "mass"},
+            "a positive number of kg, at most 1e6", body.mass_kg);
     require(all_finite(body.com_m) && all_finite(body.inertia_kg_m2), {place_, "inertia"},
             "finite values", "a value that is not finite");
     const Vector3 moments = principal(body.inertia_kg_m2);

@@ -243,6 +243,18 @@ INSTANTIATE_TEST_SUITE_P(
                         joint("j", "a", "b", "revolute",
                               "<limit lower='1' upper='1' effort='1' velocity='1'/>")),
                   {"r.urdf: line 4", "contain no angle"}},
+        WrongUrdf{"turned_limits",
+                  robot(link("a") + link("b") +
+                        joint("j", "a", "b", "revolute",
+                              "<limit lower='2' upper='1' effort='1' velocity='1'/>")),
+                  {"r.urdf: line 4", "contain no angle", "found 2 and 1"}},
+        WrongUrdf{"planet",
+                  robot(link("a") + link("b", inertial("1e308")) + joint("j", "a", "b")),
+                  {"r.urdf: line 3", "joint 'j': mass", "at most 1e6"}},
+        WrongUrdf{"far_centre",
+                  robot(link("a") + link("b") + link("c", inertial("1", "1e200 0 0")) +
+                        joint("j", "a", "b") + joint("f", "b", "c", "fixed", "")),
+                  {"r.urdf: line 3", "link 'b'", "not finite"}},
         WrongUrdf{"no_effort",
                   robot(link("a") + link("b") +
                         joint("j", "a", "b", "revolute",
