@@ -109,6 +109,16 @@ TEST(Urdf, RollPitchAndYawAreAboutFixedAxes) {
     EXPECT_NEAR(arm.joints[0].origin.rotation[i], expected[i], 1e-12) << i;
 }
 
+TEST(Urdf, ThreeAnglesAreRollThenPitchThenYaw) {
+  const ArmModel arm =
+      read(robot(link("base") + link("a") + link("tool") + joint("j", "base", "a") +
+                 joint("f", "a", "tool", "fixed", "<origin rpy='0.3 0.4 0.5'/>")));
+  // Rz(0.5) Ry(0.4) Rx(0.3), multiplied out apart from this code.
+  const Matrix3 expected = {0.808307,  -0.357020, 0.468163, 0.441580, 0.893559,
+                            -0.080985, -0.389418, 0.272192, 0.879923};
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(arm.flange.rotation[i], expected[i], 1e-6) << i;
+}
+
 TEST(Urdf, TheAxesOfAnInertiaMayBeTurned) {
   const ArmModel arm = read(robot(link("base") +
                                   link("a", inertial("2", "0 0 0", "ixx='0.1' iyy='0.2' izz='0.25'",
