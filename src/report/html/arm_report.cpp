@@ -78,6 +78,7 @@ std::vector<ReportFigure> arm_figures(const ArmModel& arm,
                                       const std::vector<std::string>& labels) {
   const ArmDynamics dynamics(arm);
   std::vector<std::vector<Vector3>> skeletons;
+  skeletons.reserve(poses_rad.size());
   for (const std::vector<double>& pose : poses_rad) skeletons.push_back(skeleton(dynamics, pose));
   std::vector<ReportFigure> figures;
   figures.emplace_back(view("The arm from the side", 0, 2, "x [m]", "z [m]", skeletons, labels));
