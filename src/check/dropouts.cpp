@@ -97,6 +97,7 @@ std::optional<Dropouts> find_dropouts(const Channel& channel, double least) {
   const std::vector<std::size_t> samples = new_samples(channel);
   if (samples.size() < kFewestSamples) return {};
   std::vector<double> values;
+  values.reserve(samples.size());
   for (const std::size_t i : samples) values.push_back(channel.values[i]);
   const std::vector<Run> runs = runs_of(values);
   if (runs.size() < kFewestBursts) return {};
