@@ -10,6 +10,7 @@
 
 #include "check/check_support.hpp"
 #include "torsio/data/mapping.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {
