@@ -138,6 +138,64 @@ TEST(Urdf, PassesOverWhatIsNotMassOrJoint) {
   EXPECT_EQ(arm.joints.size(), 1U);
 }
 
+ArmModel with_frames(const std::string& links, const std::string& joints) {
+  return read(robot(link("base") + link("a") + joint("j", "base", "a") + links + joints));
+}
+std::string frame(const std::string& parent, const std::string& child, const std::string& xyz) {
+  return joint("to_" + child, parent, child, "fixed", "<origin xyz='" + xyz + "'/>");
+}
+
+TEST(Urdf, WhereTheChainForksTheFlangeIsTheLinkOfThatName) {
+  const std::string camera = link("camera", "") + link("lens", "");
+  const std::string to_camera = frame("a", "camera", "0 0 0.05") + frame("camera", "lens", "0 0 1");
+  for (const char* name : {"flange", "tool0"}) {
+    const ArmModel arm =
+        with_frames(link(name, "") + camera, frame("a", name, "0.1 0 0") + to_camera);
+    EXPECT_EQ(arm.flange.position_m, (Vector3{0.1, 0, 0})) << name;
+  }
+  const ArmModel both =
+      with_frames(link("flange", "") + link("tool0", "") + camera,
+                  frame("a", "flange", "0.1 0 0") + frame("flange", "tool0", "1 0 0") + to_camera);
+  EXPECT_EQ(both.flange.position_m, (Vector3{0.1, 0, 0}));
+}
+
+TEST(Urdf, TheFlangeIsTheEndOfTheFirstLongestBranchIfNoneHasItsName) {
+  const ArmModel one =
+      with_frames(link("flange", "") + link("tool", ""),
+                  frame("a", "flange", "0.1 0 0") + frame("flange", "tool", "1 0 0"));
+  EXPECT_EQ(one.flange.position_m, (Vector3{1.1, 0, 0}));
+  const ArmModel equal = with_frames(link("left", "") + link("right", ""),
+                                     frame("a", "left", "0 1 0") + frame("a", "right", "0 -1 0"));
+  EXPECT_EQ(equal.flange.position_m, (Vector3{0, 1, 0}));
+}
+
+TEST(Urdf, AFixedLinkMayBeAPointMass) {
+  const ArmModel arm = with_frames(link("lead", inertial("1", "0 0 0", "ixx='0' iyy='0' izz='0'")),
+                                   frame("a", "lead", "0.3 0 0"));
+  EXPECT_DOUBLE_EQ(arm.joints[0].body.mass_kg, 3.0);
+  EXPECT_NEAR(arm.joints[0].body.inertia_kg_m2[2], 0.1 + 2.0 * 0.01 + 1.0 * 0.04, 1e-12);
+}
+
+TEST(Urdf, ElementsAndAttributesOfOtherProgramsArePassedOver) {
+  const ArmModel arm = with_frames(
+      link("tool", "<drake:x/><contact/><self_collide>1</self_collide>"),
+      joint("f", "a", "tool", "fixed", "<origin xyz='0.1 0 0' drake:y='1'/><compliance/>"));
+  EXPECT_EQ(arm.flange.position_m, (Vector3{0.1, 0, 0}));
+}
+
+TEST(Urdf, AThousandLinksAreReadAndOneMoreIsRefused) {
+  const auto chain = [](int count) {
+    std::string text = link("l0") + link("l1") + joint("j1", "l0", "l1");
+    for (int l = 2; l < count; ++l)
+      text += link("l" + std::to_string(l)) +
+              frame("l" + std::to_string(l - 1), "l" + std::to_string(l), "0 0 0.001");
+    return robot(text);
+  };
+  EXPECT_DOUBLE_EQ(read(chain(1000)).joints[0].body.mass_kg, 2.0 * 999);
+  EXPECT_THAT(test::error_message([&] { (void)read(chain(1001)); }),
+              HasSubstr("at most 1000 links"));
+}
+
 struct WrongUrdf {
   std::string name;
   std::string text;
@@ -179,10 +237,10 @@ INSTANTIATE_TEST_SUITE_P(
                   {"r.urdf: line 1", "DOCTYPE"}},
         WrongUrdf{"deep", nested(100), {"64 deep"}},
         WrongUrdf{"huge", std::string((std::size_t{4} << 20U) + 1, ' '), {"4 MiB"}},
-        WrongUrdf{"no_link", robot(""), {"the base", "no link"}},
+        WrongUrdf{"no_link", robot(""), {"r.urdf: line 1", "the base", "no link"}},
         WrongUrdf{"fixed_only",
                   robot(link("a") + link("b") + joint("f", "a", "b", "fixed", "")),
-                  {"at least one revolute joint"}},
+                  {"r.urdf: line 1", "at least one revolute joint"}},
         WrongUrdf{"unnamed_joint",
                   robot(link("a") + link("b") + joint("", "a", "b")),
                   {"r.urdf: line 4: <joint>", "a name"}},
@@ -218,11 +276,11 @@ INSTANTIATE_TEST_SUITE_P(
                   {"r.urdf: line 7", "link 'c' has two parents: a loop"}},
         WrongUrdf{"circle",
                   robot(link("a") + link("b") + joint("j", "a", "b") + joint("k", "b", "a")),
-                  {"a loop of joints"}},
+                  {"r.urdf: line 5", "a loop of joints, of which 'k'"}},
         WrongUrdf{"circle_beside",
                   robot(link("base") + link("x") + joint("i", "base", "x") + link("a") + link("b") +
                         joint("j", "a", "b") + joint("k", "b", "a")),
-                  {"not connected to the base"}},
+                  {"r.urdf: line 7", "joint 'j'", "not connected to the base 'base'"}},
         WrongUrdf{"two_roots", robot(link("a") + link("b")), {"r.urdf: line 3", "'a' and 'b'"}},
         WrongUrdf{
             "branch",
@@ -286,6 +344,47 @@ INSTANTIATE_TEST_SUITE_P(
             "zero_axis",
             robot(link("a") + link("b") + joint("j", "a", "b", "revolute", "<axis xyz='0 0 0'/>")),
             {"r.urdf: line 4: <axis>", "a length above 0"}},
+        WrongUrdf{"blank", " \n\t\n", {"r.urdf: line 1", "an empty text"}},
+        WrongUrdf{"xacro",
+                  robot("<xacro:arm prefix='left'/>\n"),
+                  {"r.urdf: line 2", "a macro of xacro", "xacro robot.urdf.xacro"}},
+        WrongUrdf{"xacro_value", robot(link("a", inertial("${m}"))), {"'${m}'", "xacro"}},
+        WrongUrdf{"misspelt_element",
+                  robot(link("a") + link("b") +
+                        joint("j", "a", "b", "revolute", "<orgin xyz='0 0 1'/>" + kMotion)),
+                  {"r.urdf: line 4: <orgin>", "Did you mean 'origin'?"}},
+        WrongUrdf{"misspelt_attribute",
+                  robot(link("a") + link("b") +
+                        joint("j", "a", "b", "revolute", "<origin xzy='0 0 1'/>" + kMotion)),
+                  {"r.urdf: line 4: <origin>", "no attribute but xyz, rpy", "'xzy'"}},
+        WrongUrdf{
+            "quaternion",
+            robot(link("a") + link("b") +
+                  joint("j", "a", "b", "revolute", "<origin quat_xyzw='0 0 1 0'/>" + kMotion)),
+            {"r.urdf: line 4: <origin>", "'quat_xyzw'"}},
+        WrongUrdf{"two_origins",
+                  robot(link("a") + link("b") +
+                        joint("j", "a", "b", "revolute", "<origin/>\n<origin/>" + kMotion)),
+                  {"r.urdf: line 5: <origin>", "a second one"}},
+        WrongUrdf{"two_inertials",
+                  robot(link("a", inertial() + "\n" + inertial())),
+                  {"r.urdf: line 3: <inertial>", "a second one"}},
+        WrongUrdf{"two_signs", robot(link("a", inertial("1", "+-1 0 0"))), {"three numbers"}},
+        WrongUrdf{"overflow", robot(link("a", inertial("1e999"))), {"'1e999'"}},
+        WrongUrdf{"limit_line",
+                  robot(link("a") + link("b") +
+                        joint("j", "a", "b", "revolute",
+                              "\n<limit lower='1' upper='0' effort='1' velocity='1'/>")),
+                  {"r.urdf: line 5", "contain no angle"}},
+        WrongUrdf{"tool_of_negative_inertia",
+                  robot(link("a") + link("b") +
+                        link("c", inertial("1", "0 0 0", "ixx='-0.05' iyy='0.01' izz='0.01'")) +
+                        joint("j", "a", "b") + frame("b", "c", "0 0 0")),
+                  {"r.urdf: line 4: link 'c'", "positive principal moments"}},
+        WrongUrdf{"frame_without_mass",
+                  robot(link("a") + link("b") + link("c", inertial("0")) + joint("j", "a", "b") +
+                        frame("b", "c", "0 0 0")),
+                  {"r.urdf: line 4", "the mass of link 'c'", "only a frame"}},
         WrongUrdf{"nine", nine_joints(), {"at most 8 revolute joints"}}),
     [](const auto& parameter) { return parameter.param.name; });
 
