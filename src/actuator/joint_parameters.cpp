@@ -3,6 +3,7 @@
 #include <string>
 #include <variant>
 
+#include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -49,6 +50,19 @@ SeriesElasticJoint series_elastic_joint(const DataSheet& sheet) {
         sheet.second);
   }
   return joint;
+}
+
+JointStop::Settings joint_stop_settings(const DataSheet& sheet, double load_Nm) {
+  const BrakeSheet brake = brake_sheet(sheet);
+  const double static_Nm = brake.static_torque_Nm.value;
+  return {.drive = drive_of(sheet),
+          .speed_rad_s = sheet.rating.speed_rad_s.value,
+          .deceleration_rad_s2 = 2.0 * sheet.rating.speed_rad_s.value,
+          .brake_static_Nm = static_Nm,
+          .brake_sliding_Nm = brake.sliding_ratio.value * static_Nm,
+          .brake_engage_s = brake.engage_s.value,
+          .brake_release_s = brake.release_s.value,
+          .load_Nm = load_Nm};
 }
 
 TubeImpedance::Settings tube_impedance_settings(const DataSheet& sheet,

@@ -2,6 +2,7 @@
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/control/design/series_elastic_joint.hpp"
+#include "torsio/control/joint_stop.hpp"
 #include "torsio/control/tube_impedance.hpp"
 
 // What the controllers take, from the data sheet of an actuator.
@@ -15,6 +16,10 @@ namespace torsio {
 /// torsion tube before the last gear is referred to the joint, and the gear is rigid: M contains
 /// the inertia of its wave generator.
 [[nodiscard]] SeriesElasticJoint series_elastic_joint(const DataSheet& sheet);
+
+/// A stop with the brake of the data sheet (`brake_sheet`), and a ramp of half a second from the rated speed.
+/// @param load_Nm the largest torque that pulls at the joint at rest
+[[nodiscard]] JointStop::Settings joint_stop_settings(const DataSheet& sheet, double load_Nm = 0.0);
 
 /// The settings of a joint with a tube before a gear. @throws Error if the actuator has none.
 [[nodiscard]] TubeImpedance::Settings tube_impedance_settings(const DataSheet& sheet,

@@ -7,16 +7,14 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <string_view>
 
 #include "data/names.hpp"
 #include "data/yaml_reader.hpp"
+#include "files/whole_file.hpp"
 #include "sim/plant/plant.hpp"
 #include "sim/sensors/sensor_set.hpp"
-#include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/arm/urdf.hpp"
 #include "torsio/core/error.hpp"
@@ -41,6 +39,7 @@ constexpr std::uint64_t kPoseSeed = 1;
 constexpr int kPoses = 2000;
 constexpr double kSlowestSpeedUp_s = 60.0;
 constexpr double kLargest = 1e6;
+constexpr std::size_t kMaxUrdfBytes = std::size_t{16} << 20U;  // read_urdf has a limit of its own
 
 /// Shares of the torque at rated current: what the spring may carry, and what no sensor measures.
 constexpr double kMeasuredShare = kLargestStaticShare;
@@ -132,13 +131,16 @@ ArmSetup parse(const YamlValue& yaml, const std::filesystem::path& folder, const
 }
 
 std::string text_of_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(in)), {});
-  if (!in && text.empty())
-    throw Error({.place = path,
-                 .problem = "cannot be read",
-                 .advice = "The path in 'urdf' is relative to the file of the arm."});
-  return text;
+  try {
+    const std::vector<std::byte> bytes = read_whole_file(path, kMaxUrdfBytes);
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  } catch (const Error& error) {
+    ErrorReport report = error.report();
+    report.problem =
+        report.problem.empty() ? "cannot be read" : "cannot be read: " + report.problem;
+    report.advice = "The path in 'urdf' is relative to the file of the arm.";
+    throw Error(std::move(report));
+  }
 }
 
 JointControllerCore::Settings control_of(const ArmJoint& joint, const DataSheet& sheet,
@@ -157,19 +159,6 @@ JointControllerCore::Settings control_of(const ArmJoint& joint, const DataSheet&
                      .max_measured_load_Nm = kMeasuredShare * rated_Nm},
           .override_rad_s = kOverride_rad_s,
           .gains = JointCascade::gains_for(drive, kOverride_rad_s)};
-}
-
-JointStop::Settings stop_of(const DataSheet& sheet, double load_Nm) {
-  const BrakeSheet brake = brake_sheet(sheet);
-  const double static_Nm = brake.static_torque_Nm.value;
-  return {.drive = drive_of(sheet),
-          .speed_rad_s = sheet.rating.speed_rad_s.value,
-          .deceleration_rad_s2 = 2.0 * sheet.rating.speed_rad_s.value,
-          .brake_static_Nm = static_Nm,
-          .brake_sliding_Nm = brake.sliding_ratio.value * static_Nm,
-          .brake_engage_s = brake.engage_s.value,
-          .brake_release_s = brake.release_s.value,
-          .load_Nm = load_Nm};
 }
 
 }  // namespace
@@ -227,7 +216,7 @@ ArmController::Settings arm_controller_settings(
     const DataSheet& sheet = from.sheet;
     ArmController::Joint joint{
         .control = control_of(setup.arm.joints[j], sheet, sheet.joint.inertia_kg_m2.value),
-        .stop = stop_of(sheet, weight_Nm[j]),
+        .stop = joint_stop_settings(sheet, weight_Nm[j]),
         .bearing_Nm = sheet.joint.bearing_friction_Nm.value,
         .viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value,
         .guiding_friction_Nm = kGuidingShare * sheet.rating.torque_Nm.value,

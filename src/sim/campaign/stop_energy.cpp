@@ -15,17 +15,6 @@ namespace {
 
 constexpr int kStopTicks = 500;
 
-JointStop::Settings stop_settings(const DataSheet& sheet, const Brake::Parameters& brake) {
-  const double ratio = total_ratio(plant_parameters(sheet));
-  return {.drive = drive_of(sheet),
-          .speed_rad_s = sheet.rating.speed_rad_s.value,
-          .deceleration_rad_s2 = 2.0 * sheet.rating.speed_rad_s.value,
-          .brake_static_Nm = brake.static_Nm * ratio,
-          .brake_sliding_Nm = brake.sliding_Nm * ratio,
-          .brake_engage_s = brake.engage_s,
-          .brake_release_s = brake.release_s};
-}
-
 }  // namespace
 
 double stop_energy_gain(const DataSheet& sheet, const PlantState& state, const Load& at_stop) {
@@ -38,7 +27,7 @@ double stop_energy_gain(const DataSheet& sheet, const PlantState& state, const L
   plant.use(brake);
   plant.set_brake(false);
   if (plant.reset(state) != Fault::none) return kNotMeasured;
-  JointStop stop(stop_settings(sheet, brake), kBenchRate_Hz);
+  JointStop stop(joint_stop_settings(sheet), kBenchRate_Hz);
   stop.trigger(StopCategory::power_off);
   const double ratio = total_ratio(plant.parameters());
   const double first_J = plant.stored_energy(load).all_J;
