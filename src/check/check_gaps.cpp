@@ -187,9 +187,9 @@ void Checker::check_gaps_of(std::size_t r, bool with_warnings) {
 // A step that is small for an angle can be the whole range of the deflection between two angles.
 void Checker::check_jump_of_input(std::size_t r) {
   const std::vector<double>& input = pairs_[r].input;
-  if (sources_.size() >= 2 && check_jumps_of_input(r)) return;
+  if (sources_.size() < 2 || check_jumps_of_input(r)) return;
   const Jump jump = largest_jump(input);
-  if (sources_.size() < 2 || !stands_out(jump, input) || is_spike(r, jump.sample) ||
+  if (!stands_out(jump, input) || is_spike(r, jump.sample) ||
       jump.height < kInputJumpShare * extent_of(input).width())
     return;
   const Recording& recording = dataset_.records[r].recording;

@@ -23,17 +23,15 @@ constexpr double kFollowsAngle = 0.9;  ///< correlation with the derivative
 constexpr double kNearFactor = 1.05;
 constexpr double kOtherFactor = 1.25;
 
-/// A unit in which the numbers may be, and how many of it are 1 rad/s.
+/// A unit in which the numbers may be.
 struct UnitOfRate {
   std::string_view suffix;
   std::string_view written;
-  double per_rad_s;
 };
-constexpr auto kUnitsOfRates =
-    std::to_array<UnitOfRate>({{"deg_s", "deg/s", 57.29577951308232},
-                               {"rpm", "revolutions per minute", 9.549296585513721},
-                               {"rad_s", "rad/s", 1.0},
-                               {"rev_s", "revolutions per second", 0.15915494309189535}});
+constexpr auto kUnitsOfRates = std::to_array<UnitOfRate>({{"deg_s", "deg/s"},
+                                                          {"rpm", "revolutions per minute"},
+                                                          {"rad_s", "rad/s"},
+                                                          {"rev_s", "revolutions per second"}});
 
 /// The angle that a speed is the derivative of, in this recording; empty if there is none.
 std::vector<double> angle_of_rate(const Recording& recording, std::string_view quantity) {
@@ -84,10 +82,10 @@ std::optional<RateFactor> factor_of_rate(const std::vector<double>& speed,
 
 /// The unit whose numbers are `factor` times those of the assumed unit; null if it is none of the usual ones.
 const UnitOfRate* unit_of_rate(double factor, const std::string& assumed) {
-  const auto* const now = std::ranges::find(kUnitsOfRates, assumed, &UnitOfRate::suffix);
-  const double per_rad_s = now != kUnitsOfRates.end() ? now->per_rad_s : 1.0;
+  const Unit* const now = find_unit(assumed);
+  const double assumed_rad_s = now != nullptr ? now->scale : 1.0;
   for (const UnitOfRate& unit : kUnitsOfRates) {
-    const double ratio = std::abs(factor) * per_rad_s / unit.per_rad_s;
+    const double ratio = std::abs(factor) * find_unit(unit.suffix)->scale / assumed_rad_s;
     if (ratio < kNearFactor && ratio > 1.0 / kNearFactor) return &unit;
   }
   return nullptr;

@@ -107,10 +107,10 @@ std::optional<Dropouts> find_dropouts(const Channel& channel, double least) {
   const double jump = std::max(least, kOverUsualSteps * quantile(std::move(steps), kUsualSteps));
   std::vector<Run> found = runs_of_one_value(runs, values, jump);
   const bool is_one_value = !found.empty() && !is_between_rests(found, values);
-  // A joint that sticks rests as well, and leaves with a jump; its sensor keeps its noise.
-  const Channel plain{.name = channel.name, .values = values};
-  const double noise = usual_noise(noise_course(plain, kAnyRate_Hz));
   if (!is_one_value) {
+    // A joint that sticks rests as well, and leaves with a jump; its sensor keeps its noise.
+    const Channel plain{.name = channel.name, .values = values};
+    const double noise = usual_noise(noise_course(plain, kAnyRate_Hz));
     if (noise < kLeastNoise * extent_of(values).width()) return {};
     found = held_runs(runs, values, jump);
   }
