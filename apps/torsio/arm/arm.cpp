@@ -11,6 +11,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "report/html/arm_figures.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -118,18 +119,7 @@ std::string stop_text(const torsio::ArmRun& run) {
 }
 
 std::string score_text(const torsio::ArmRun& run) {
-  torsio::TextTable table;
-  table.header({"joint", "actuator", "position [mrad]", "torque [Nm]", "external torque [Nm]",
-                "largest torque [Nm]", "of the rating [%]", "limited [s]"});
-  for (const torsio::ArmJointScore& score : run.scores)
-    table.row(
-        {score.joint, score.actuator,
-         score.position_rmse_rad ? fmt::format("{:.2f}", 1e3 * *score.position_rmse_rad) : "-",
-         fmt::format("{:.3f}", score.torque_rmse_Nm), fmt::format("{:.3f}", score.external_rmse_Nm),
-         fmt::format("{:.1f}", score.largest_torque_Nm),
-         fmt::format("{:.0f}", 100.0 * score.largest_share),
-         fmt::format("{:.2f}", score.limited_s)});
-  return table.text() +
+  return torsio::arm_scores(run).text() +
          "position, torque, external torque: RMSE to the truth; the position of the links in moves "
          "and holds\n";
 }

@@ -5,6 +5,8 @@
 
 #include "torsio/arm/arm_model.hpp"
 #include "torsio/report/document/report_document.hpp"
+#include "torsio/report/text_table.hpp"
+#include "torsio/sim/arm/arm_run.hpp"
 
 namespace torsio {
 
@@ -14,5 +16,8 @@ namespace torsio {
 [[nodiscard]] std::vector<ReportFigure> arm_figures(
     const ArmModel& arm, const std::vector<std::vector<double>>& poses_rad,
     const std::vector<std::string>& labels);
+
+/// The scores of the joints of a run.
+[[nodiscard]] TextTable arm_scores(const ArmRun& run);
 
 }  // namespace torsio

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "report/html/arm_figures.hpp"
+#include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/core/units.hpp"
@@ -54,23 +55,6 @@ TimeFigure torques(const ArmRun& run) {
   return builder.finish();
 }
 
-ReportTable score_table(const ArmRun& run) {
-  ReportTable table{.headings = {"joint", "actuator", "position RMSE [mrad]", "torque RMSE [Nm]",
-                                 "external torque RMSE [Nm]", "largest torque [Nm]",
-                                 "of the rating [%]", "limited [s]"},
-                    .rows = {}};
-  for (const ArmJointScore& score : run.scores)
-    table.rows.push_back(
-        {{score.joint, score.actuator,
-          score.position_rmse_rad ? fmt::format("{:.2f}", 1e3 * *score.position_rmse_rad) : "-",
-          fmt::format("{:.3f}", score.torque_rmse_Nm),
-          fmt::format("{:.3f}", score.external_rmse_Nm),
-          fmt::format("{:.1f}", score.largest_torque_Nm),
-          fmt::format("{:.0f}", 100.0 * score.largest_share),
-          fmt::format("{:.2f}", score.limited_s)}});
-  return table;
-}
-
 }  // namespace
 
 std::vector<ReportFigure> arm_figures(const ArmModel& arm,
@@ -86,6 +70,21 @@ std::vector<ReportFigure> arm_figures(const ArmModel& arm,
   return figures;
 }
 
+TextTable arm_scores(const ArmRun& run) {
+  TextTable table;
+  table.header({"joint", "actuator", "position [mrad]", "torque [Nm]", "external torque [Nm]",
+                "largest torque [Nm]", "of the rating [%]", "limited [s]"});
+  for (const ArmJointScore& score : run.scores)
+    table.row(
+        {score.joint, score.actuator,
+         score.position_rmse_rad ? fmt::format("{:.2f}", 1e3 * *score.position_rmse_rad) : "-",
+         fmt::format("{:.3f}", score.torque_rmse_Nm), fmt::format("{:.3f}", score.external_rmse_Nm),
+         fmt::format("{:.1f}", score.largest_torque_Nm),
+         fmt::format("{:.0f}", 100.0 * score.largest_share),
+         fmt::format("{:.2f}", score.limited_s)});
+  return table;
+}
+
 ReportDocument arm_report(const ArmSetup& setup, const ArmRun& run,
                           std::vector<std::string> summary) {
   summary.emplace_back(
@@ -97,7 +96,7 @@ ReportDocument arm_report(const ArmSetup& setup, const ArmRun& run,
                           .origin = {}};
   ReportSection scores{.heading = "Joints",
                        .text = "Position, torque and external torque: RMSE to the true values."};
-  scores.tables.push_back(score_table(run));
+  scores.tables.push_back(report_table(arm_scores(run)));
   document.sections.push_back(std::move(scores));
 
   std::vector<std::vector<double>> poses;
