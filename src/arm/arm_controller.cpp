@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "core/all_finite.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
@@ -16,35 +17,22 @@ namespace {
 constexpr auto kPlace = "arm controller";
 constexpr double kGuidingWidth_rad = 0.01;  // width of the friction that holds a guided arm
 
-bool is_finite(const ArmDynamics::PerJoint& values) noexcept {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
 bool is_finite(const ArmFrame& frame) noexcept {
-  const auto finite = [](double value) { return std::isfinite(value); };
-  return std::ranges::all_of(frame.position_m, finite) &&
-         std::ranges::all_of(frame.rotation, finite);
+  return all_finite(frame.position_m) && all_finite(frame.rotation);
 }
 bool is_finite(const JointSample& sample) noexcept {
   return std::isfinite(sample.motor_angle_rad + sample.gear_angle_rad + sample.joint_angle_rad);
 }
 
-struct ChannelOfSample {
-  std::string_view name;
-  double JointSample::*value;
-};
-constexpr std::array kChannels{ChannelOfSample{"motor_angle_rad", &JointSample::motor_angle_rad},
-                               ChannelOfSample{"gear_angle_rad", &JointSample::gear_angle_rad},
-                               ChannelOfSample{"joint_angle_rad", &JointSample::joint_angle_rad},
-                               ChannelOfSample{"motor_current_A", &JointSample::motor_current_A}};
-
-double JointSample::*channel_of(std::string_view name) {
-  const auto* const found = std::ranges::find(kChannels, name, &ChannelOfSample::name);
-  if (found == kChannels.end())
-    throw Error({.place = fmt::format("{}: monitor", kPlace),
-                 .expected = "the channels motor_angle_rad, gear_angle_rad, joint_angle_rad and "
-                             "motor_current_A",
-                 .found = std::string(name)});
-  return found->value;
+/// Feeds a monitor with the channels that a `JointSample` has.
+detail::JointInputs inputs_of(const MonitoredTorque& monitored) {
+  try {
+    return {monitored.raw_inputs(), "torque_Nm"};
+  } catch (const Error& error) {
+    ErrorReport report = error.report();
+    report.advice = "Calibrate the monitor with these channels only.";
+    throw Error(std::move(report));
+  }
 }
 
 }  // namespace
@@ -68,9 +56,8 @@ ArmController::Axis::Axis(Joint&& from, double sample_rate_Hz, double speed_cuto
   require_not_negative(kPlace, "the viscous friction of the bearing", viscous_Nms_rad);
   require_positive(kPlace, "the largest external torque", largest_external_Nm);
   if (!monitored) return;
-  for (const std::string& input : monitored->raw_inputs())
-    monitored_channels.push_back(channel_of(input));
-  monitored_inputs.resize(monitored_channels.size());
+  monitor_inputs.emplace(inputs_of(*monitored));
+  monitor_samples.resize(monitored->raw_inputs().size());
 }
 
 ArmController::ArmController(Settings settings, double sample_rate_Hz)
@@ -242,19 +229,18 @@ void ArmController::estimate(std::span<const JointSample> samples) noexcept {
     const JointSample sample = samples.empty() ? JointSample{} : samples[j];
     Estimate torque;
     if (axis.monitored) {
-      for (std::size_t i = 0; i < axis.monitored_channels.size(); ++i)
-        axis.monitored_inputs[i] = {.value = sample.*axis.monitored_channels[i]};
-      const FusedTorque fused = axis.monitored->step(sample.t_s, axis.monitored_inputs);
+      std::ranges::transform(axis.monitor_inputs->from(sample), axis.monitor_samples.begin(),
+                             [](double value) { return SignalSample{.value = value}; });
+      const FusedTorque fused = axis.monitored->step(sample.t_s, axis.monitor_samples);
       torque = {.value = fused.value_Nm, .std_dev = fused.std_dev_Nm, .fault = fused.fault};
     } else if (axis.estimator) {
       torque = axis.estimator->step(sample);
     } else {
       torque.value = axis.stiffness_Nm_rad * sample.spring_deflection_rad();
       if (!std::isfinite(torque.value))
-        torque = {.value = spring_Nm_[j], .fault = Fault::input_not_finite};
+        torque = {.value = output_.joints[j].torque.value, .fault = Fault::input_not_finite};
     }
     output_.joints[j].torque = torque;
-    spring_Nm_[j] = torque.value;
     on_links_Nm[j] = torque.value - bearing_torque(axis, speed_rad_s_[j]);
     output_.joints[j].link_Nm = on_links_Nm[j];
   }
@@ -283,11 +269,11 @@ bool ArmController::is_usable(const ArmReference& reference) const noexcept {
                                  [](const JointReference& of) { return torsio::is_finite(of); });
     case ArmMode::position:
     case ArmMode::impedance:
-      return is_finite(reference.position_rad) && is_finite(reference.velocity_rad_s) &&
-             is_finite(reference.acceleration_rad_s2) && is_finite(reference.stiffness_Nm_rad) &&
-             is_finite(reference.damping_Nms_rad);
+      return all_finite(reference.position_rad) && all_finite(reference.velocity_rad_s) &&
+             all_finite(reference.acceleration_rad_s2) && all_finite(reference.stiffness_Nm_rad) &&
+             all_finite(reference.damping_Nms_rad);
     case ArmMode::cartesian:
-      return cartesian_ && is_finite(reference.flange) && is_finite(reference.position_rad);
+      return cartesian_ && is_finite(reference.flange) && all_finite(reference.position_rad);
     case ArmMode::guiding: return true;
   }
   return false;
@@ -427,7 +413,6 @@ std::string_view name(ArmStopCause cause) noexcept {
     case ArmStopCause::requested: return "requested";
     case ArmStopCause::measurement: return "measurement";
     case ArmStopCause::monitor: return "monitor";
-    case ArmStopCause::controller: return "controller";
     case ArmStopCause::overload: return "overload";
   }
   return "unknown";

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "arm/vector3.hpp"
+#include "core/all_finite.hpp"
 
 namespace torsio {
 namespace {
@@ -75,8 +76,7 @@ bool ArmDynamics::set_payload(const BodyInertia& payload) noexcept {
 }
 
 bool ArmDynamics::set_gravity(const Vector3& gravity_m_s2) noexcept {
-  if (!std::ranges::all_of(gravity_m_s2, [](double value) { return std::isfinite(value); }))
-    return false;
+  if (!all_finite(gravity_m_s2)) return false;
   gravity_m_s2_ = gravity_m_s2;
   return true;
 }
@@ -204,10 +204,11 @@ void ArmDynamics::forward(std::span<const double> angle_rad, std::span<const dou
 }
 
 void ArmDynamics::momentum(std::span<const double> angle_rad, std::span<const double> speed_rad_s,
-                           std::span<double> momentum_Nms,
-                           std::span<double> energy_gradient_Nm) const noexcept {
+                           std::span<double> momentum_Nms, std::span<double> energy_gradient_Nm,
+                           std::span<double> gravity_Nm) const noexcept {
   Turned at;
   place(angle_rad, at);
+  newton_euler<false, false>(at, nullptr, nullptr, gravity_Nm.data());
   std::array<Vector3, kMaxArmJoints> spin;
   std::array<Vector3, kMaxArmJoints> velocity;
   std::array<Vector3, kMaxArmJoints> linear;
@@ -254,23 +255,24 @@ ArmFrame ArmDynamics::link(std::size_t joint, std::span<const double> angle_rad)
   return product(outwards(joint, angle_rad), {{}, transposed(to_joint_[joint])});
 }
 
-void ArmDynamics::jacobian(std::span<const double> angle_rad,
-                           std::span<double> jacobian) const noexcept {
+ArmFrame ArmDynamics::jacobian(std::span<const double> angle_rad,
+                               std::span<double> jacobian) const noexcept {
   Turned at;
   place(angle_rad, at);
   std::array<ArmFrame, kMaxArmJoints> frames;
   ArmFrame frame;
   for (std::size_t i = 0; i < count_; ++i)
     frames[i] = frame = product(frame, {links_[i].origin.position_m, at.rotation[i]});
-  const Vector3 tip_m = product(frame, flange_).position_m;
+  const ArmFrame tip = product(frame, flange_);
   for (std::size_t i = 0; i < count_; ++i) {
     const Vector3 axis = column(frames[i].rotation, 2);
-    const Vector3 velocity = cross(axis, tip_m - frames[i].position_m);
+    const Vector3 velocity = cross(axis, tip.position_m - frames[i].position_m);
     for (std::size_t row = 0; row < 3; ++row) {
       jacobian[row * count_ + i] = velocity[row];
       jacobian[(3 + row) * count_ + i] = axis[row];
     }
   }
+  return tip;
 }
 
 double ArmDynamics::kinetic_energy(std::span<const double> angle_rad,

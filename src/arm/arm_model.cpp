@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "arm/vector3.hpp"
+#include "core/all_finite.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
@@ -20,10 +21,6 @@ constexpr double kGravity_m_s2 = 9.81;
 constexpr double kLargestAngle_rad = 1e3;  // sines of larger ones lose digits
 constexpr double kUnitTolerance = 1e-6;
 constexpr double kLargestMass_kg = 1e6;  // far above any arm; torques of larger ones overflow
-
-bool all_finite(std::span<const double> values) {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
 
 /// The principal moments, in rising order, by the closed form for the roots of a cubic (Smith 1961).
 Vector3 principal(const Symmetric3& s) {

@@ -150,9 +150,8 @@ CartesianImpedance::Output CartesianImpedance::step(const ArmDynamics& dynamics,
   const std::size_t n = dynamics.size();
   Task task;
   Output output;
-  dynamics.jacobian(angle_rad, task.jacobian);
+  task.flange = dynamics.jacobian(angle_rad, task.jacobian);
   dynamics.equation(angle_rad, speed_rad_s, task.mass, output.torque_Nm);  // c + g
-  task.flange = dynamics.flange(angle_rad);
   weigh(task, n);
   output.wrench = wrench(task, speed_rad_s.first(n), reference.flange);
   output.manipulability = manipulability(task.jacobian, n);

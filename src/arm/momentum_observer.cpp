@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
+#include "core/all_finite.hpp"
 #include "core/checks.hpp"
 
 namespace torsio {
@@ -12,10 +12,6 @@ namespace {
 
 constexpr auto kPlace = "momentum observer";
 constexpr double kHighestShare = 0.2;  // highest bandwidth over the sample rate
-
-bool all_finite(std::span<const double> values) noexcept {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
 
 }  // namespace
 
@@ -42,8 +38,7 @@ Fault MomentumObserver::step(const ArmDynamics& dynamics, std::span<const double
   ArmDynamics::PerJoint momentum_Nms;
   ArmDynamics::PerJoint gradient_Nm;
   ArmDynamics::PerJoint gravity_Nm;
-  dynamics.momentum(angle_rad, speed_rad_s, momentum_Nms, gradient_Nm);
-  dynamics.gravity_torque(angle_rad, gravity_Nm);
+  dynamics.momentum(angle_rad, speed_rad_s, momentum_Nms, gradient_Nm, gravity_Nm);
   if (!all_finite(std::span(momentum_Nms).first(count_)) ||
       !all_finite(std::span(gradient_Nm).first(count_)) || !all_finite(torque_Nm.first(count_))) {
     is_started_ = false;

@@ -50,6 +50,16 @@ ArmModel skewed_arm() {
   return arm;
 }
 
+/// The change of orientation per joint angle: the skew-symmetric part of dR/dq Rᵀ, by a central difference.
+Vector3 spin_between(const ArmFrame& before, const ArmFrame& after, const ArmFrame& here,
+                     double width_rad) {
+  Matrix3 rate;
+  for (std::size_t i = 0; i < 9; ++i)
+    rate[i] = (after.rotation[i] - before.rotation[i]) / width_rad;
+  const Matrix3 turn = product(rate, transposed(here.rotation));
+  return {turn[7], turn[2], turn[3]};
+}
+
 /// The mass matrix of the definition, sum over the bodies of m Jᵀ J + Jᵀ I J, by finite differences of
 /// the frames.
 Square mass_by_definition(const ArmModel& arm, const test::Arm6Joints& angle_rad) {
@@ -73,12 +83,7 @@ Square mass_by_definition(const ArmModel& arm, const test::Arm6Joints& angle_rad
         return frame.position_m + rotated(frame.rotation, inertia.com_m);
       };
       velocity[j] = (0.5 / kStep) * (com(after) - com(before));
-      // The skew-symmetric part of dR/dq Rᵀ.
-      Matrix3 rate;
-      for (std::size_t i = 0; i < 9; ++i)
-        rate[i] = (after.rotation[i] - before.rotation[i]) / (2.0 * kStep);
-      const Matrix3 turn = product(rate, transposed(here.rotation));
-      spin[j] = {turn[7], turn[2], turn[3]};
+      spin[j] = spin_between(before, after, here, 2.0 * kStep);
     }
     const auto in_base = rotated(here.rotation, inertia.inertia_kg_m2);
     for (std::size_t i = 0; i < test::kArm6Joints; ++i)
@@ -221,7 +226,11 @@ TEST(ArmDynamics, ItsMomentumAndGradientAreThoseOfTheKineticEnergy) {
     const test::Arm6Joints speed_rad_s = random_joints(random, 2.0);
     test::Arm6Joints momentum_Nms;
     test::Arm6Joints gradient_Nm;
-    dynamics.momentum(angle_rad, speed_rad_s, momentum_Nms, gradient_Nm);
+    test::Arm6Joints gravity_Nm;
+    test::Arm6Joints expected_Nm;
+    dynamics.momentum(angle_rad, speed_rad_s, momentum_Nms, gradient_Nm, gravity_Nm);
+    dynamics.gravity_torque(angle_rad, expected_Nm);
+    EXPECT_EQ(gravity_Nm, expected_Nm);
     Square mass;
     dynamics.mass_matrix(angle_rad, mass);
     for (std::size_t i = 0; i < test::kArm6Joints; ++i) {
@@ -248,8 +257,8 @@ TEST(ArmDynamics, ItsJacobianIsTheDerivativeOfTheFlange) {
   constexpr double kStep = 1e-6;
   const test::Arm6Joints angle_rad = random_joints(random, 3.0);
   std::array<double, 6 * test::kArm6Joints> jacobian;
-  dynamics.jacobian(angle_rad, jacobian);
-  const ArmFrame here = dynamics.flange(angle_rad);
+  const ArmFrame here = dynamics.jacobian(angle_rad, jacobian);
+  EXPECT_EQ(here.position_m, dynamics.flange(angle_rad).position_m);
   for (std::size_t j = 0; j < test::kArm6Joints; ++j) {
     test::Arm6Joints more = angle_rad;
     test::Arm6Joints less = angle_rad;
@@ -257,11 +266,7 @@ TEST(ArmDynamics, ItsJacobianIsTheDerivativeOfTheFlange) {
     less[j] -= kStep;
     const ArmFrame after = dynamics.flange(more);
     const ArmFrame before = dynamics.flange(less);
-    Matrix3 rate;
-    for (std::size_t i = 0; i < 9; ++i)
-      rate[i] = (after.rotation[i] - before.rotation[i]) / (2.0 * kStep);
-    const Matrix3 turn = product(rate, transposed(here.rotation));
-    const Vector3 spin = {turn[7], turn[2], turn[3]};
+    const Vector3 spin = spin_between(before, after, here, 2.0 * kStep);
     for (std::size_t row = 0; row < 3; ++row) {
       EXPECT_NEAR(jacobian[row * test::kArm6Joints + j],
                   (after.position_m[row] - before.position_m[row]) / (2.0 * kStep), 1e-8);

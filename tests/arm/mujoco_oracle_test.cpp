@@ -2,69 +2,38 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
-#include <mujoco/mujoco.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <memory>
-#include <stdexcept>
 #include <string>
 
-#include "arm/vector3.hpp"
 #include "support/arm6.hpp"
-#include "support/temporary_folder.hpp"
+#include "support/mujoco_model.hpp"
 #include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
-std::string text(const Vector3& of) { return fmt::format("{} {} {}", of[0], of[1], of[2]); }
-
-std::string inertial(const BodyInertia& body) {
-  return fmt::format("<inertial pos='{}' mass='{}' fullinertia='{}'/>", text(body.com_m),
-                     body.mass_kg, fmt::join(body.inertia_kg_m2, " "));
-}
-
 /// The arm with rigid joints.
 std::string model_text(const ArmModel& arm) {
-  std::string text_of =
-      "<mujoco><compiler angle='radian' inertiafromgeom='false' balanceinertia='false'/>"
-      "<option timestep='1e-4' integrator='Euler' gravity='" +
-      text(arm.gravity_m_s2) +
-      "'><flag contact='disable' constraint='disable'/></option><worldbody>";
-  for (std::size_t j = 0; j < arm.joints.size(); ++j) {
-    const ArmJoint& joint = arm.joints[j];
-    const BodyInertia body = j + 1 < arm.joints.size()
-                                 ? joint.body
-                                 : together(joint.body, moved(arm.payload, arm.flange));
-    text_of += "<body pos='" + text(joint.origin.position_m) + "'>" + inertial(body) +
-               "<joint type='hinge' axis='" + text(joint.axis) + "'/>";
-  }
-  for (std::size_t j = 0; j < arm.joints.size(); ++j) text_of += "</body>";
-  return text_of + "</worldbody></mujoco>";
+  std::string text = test::mujoco_begin(arm);
+  for (std::size_t j = 0; j < arm.joints.size(); ++j)
+    text += fmt::format("<body pos='{}'>{}<joint type='hinge' axis='{}'/>",
+                        fmt::join(arm.joints[j].origin.position_m, " "),
+                        test::mujoco_inertial(test::loaded_link(arm, j)),
+                        fmt::join(arm.joints[j].axis, " "));
+  for (std::size_t j = 0; j < arm.joints.size(); ++j) text += "</body>";
+  return text + "</worldbody></mujoco>";
 }
-
-struct Model {
-  explicit Model(const std::string& xml) {
-    const TemporaryFolder folder;
-    const std::string file = folder.file("arm.xml", xml);
-    std::array<char, 1000> message{};
-    model.reset(mj_loadXML(file.c_str(), nullptr, message.data(), message.size()));
-    if (!model) throw std::runtime_error(message.data());
-    data.reset(mj_makeData(model.get()));
-  }
-  std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model{nullptr, mj_deleteModel};
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
-};
 
 TEST(MujocoOracle, InverseDynamicsAgreeInTenThousandStates) {
   ArmModel arm = test::arm6();
   arm.payload = test::payload_of_8_kg();
   const ArmDynamics dynamics(arm);
-  const Model oracle(model_text(arm));
+  const test::MujocoModel oracle(model_text(arm));
   Random random(1);
   double worst_Nm = 0.0;
   double worst_kg_m2 = 0.0;

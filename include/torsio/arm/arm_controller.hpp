@@ -47,7 +47,6 @@ enum class ArmStopCause : std::uint8_t {
   requested,    ///< by `ArmController::stop`
   measurement,  ///< a joint's sample was not finite for too many ticks
   monitor,      ///< the monitor of a joint
-  controller,   ///< a reference or an output of a joint's controller was not finite
   overload,     ///< the external torque of a joint exceeded its limit for too long
 };
 
@@ -178,8 +177,8 @@ class ArmController {
     JointStop stop;
     std::optional<TorqueEstimator> estimator;
     std::optional<MonitoredTorque> monitored;
-    std::vector<SignalSample> monitored_inputs;
-    std::vector<double JointSample::*> monitored_channels;
+    std::optional<detail::JointInputs> monitor_inputs;
+    std::vector<SignalSample> monitor_samples;
     Differentiator speed;      ///< speed of the link, filtered
     Differentiator raw_speed;  ///< for the observer
     Differentiator motor_speed;
@@ -220,7 +219,6 @@ class ArmController {
   ArmDynamics::PerJoint angle_rad_ = {};
   ArmDynamics::PerJoint speed_rad_s_ = {};
   ArmDynamics::PerJoint raw_speed_rad_s_ = {};
-  ArmDynamics::PerJoint spring_Nm_ = {};
   std::array<JointReference, kMaxArmJoints> references_ = {};
   ArmReference holding_ =
       {};  ///< where the arm was at the first step, or when a reference was refused

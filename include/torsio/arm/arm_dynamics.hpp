@@ -61,24 +61,25 @@ class ArmDynamics {
                std::span<const double> torque_Nm,
                std::span<double> acceleration_rad_s2) const noexcept TORSIO_REALTIME;
 
-  /// The momentum p = M(q) q̇ [Nms] and the derivative of the kinetic energy ∂T/∂q [Nm], with which
+  /// The momentum p = M(q) q̇ [Nms], the derivative of the kinetic energy ∂T/∂q [Nm] and g(q) [Nm] of one state, with which
   ///
   ///     ṗ = τ + J(q)ᵀ f + ∂T/∂q − g(q)
   ///
   /// T changes with q_i as the links beyond the joint turn against the motion before it:
   /// ∂T/∂q_i = −(S_i × v_i) · h_i, v_i the spatial velocity of link i, h_i the momentum of all links from i on.
   void momentum(std::span<const double> angle_rad, std::span<const double> speed_rad_s,
-                std::span<double> momentum_Nms,
-                std::span<double> energy_gradient_Nm) const noexcept TORSIO_REALTIME;
+                std::span<double> momentum_Nms, std::span<double> energy_gradient_Nm,
+                std::span<double> gravity_Nm) const noexcept TORSIO_REALTIME;
 
   /// @returns the frame of the flange in that of the base
   [[nodiscard]] ArmFrame flange(std::span<const double> angle_rad) const noexcept TORSIO_REALTIME;
   /// @returns the frame of a link in that of the base
   [[nodiscard]] ArmFrame link(std::size_t joint,
                               std::span<const double> angle_rad) const noexcept TORSIO_REALTIME;
-  /// @returns J, 6 x n row by row
-  void jacobian(std::span<const double> angle_rad,
-                std::span<double> jacobian) const noexcept TORSIO_REALTIME;
+  /// J, 6 x n row by row.
+  /// @returns the frame of the flange in that of the base
+  ArmFrame jacobian(std::span<const double> angle_rad,
+                    std::span<double> jacobian) const noexcept TORSIO_REALTIME;
 
   [[nodiscard]] double kinetic_energy(std::span<const double> angle_rad,
                                       std::span<const double> speed_rad_s) const noexcept

@@ -75,7 +75,7 @@ void ArmLog::score(Joint& joint, const ArmController::JointOutput& output, doubl
 }
 
 void ArmLog::add(const ArmBench& bench, const ArmController::Output& output,
-                 const ArmReference& wanted, bool is_position, const ArmLoad& /*load*/) {
+                 const ArmReference& wanted, bool is_position) {
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     Joint& joint = joints_[j];
     const Measurement& measured = bench.measured(j);

@@ -22,7 +22,7 @@ class ArmLog {
   /// The same tick with what the controller made of it.
   /// @param is_position whether the links are to be at the angles of `wanted`
   void add(const ArmBench& bench, const ArmController::Output& output, const ArmReference& wanted,
-           bool is_position, const ArmLoad& load);
+           bool is_position);
   [[nodiscard]] std::size_t size() const noexcept { return ticks_; }
   void finish(ArmRun& run) &&;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "arm/vector3.hpp"
@@ -31,11 +32,11 @@ class ProgramReference {
   /// Whether the links are to be at the angles of the reference.
   [[nodiscard]] bool is_position() const { return reference_.mode == ArmMode::position; }
 
-  /// @param angle_rad measured, one per joint; @param flange there
+  /// @param angle_rad measured, one per joint
   const ArmReference& next(std::span<const double> angle_rad, std::span<const double> speed_rad_s,
-                           const ArmFrame& flange) {
+                           const ArmDynamics& dynamics) {
     const ArmStep& step = program_.steps[step_];
-    if (tick_ == 0) begin(step, angle_rad, speed_rad_s, flange);
+    if (tick_ == 0) begin(step, angle_rad, speed_rad_s, dynamics);
     if (step.task == ArmTask::hold) slow_down();
     if (step.task == ArmTask::move) {
       const ArmMove::Output moved = move_->step();
@@ -47,6 +48,7 @@ class ProgramReference {
     }
     return reference_;
   }
+  [[nodiscard]] const ArmReference& current() const { return reference_; }
   [[nodiscard]] ArmLoad load() const {
     ArmLoad load;
     for (const ArmPush& push : program_.steps[step_].pushes) {
@@ -68,7 +70,7 @@ class ProgramReference {
 
  private:
   void begin(const ArmStep& step, std::span<const double> angle_rad,
-             std::span<const double> speed_rad_s, const ArmFrame& flange) {
+             std::span<const double> speed_rad_s, const ArmDynamics& dynamics) {
     reference_ = {};
     duration_s_ = step.duration_s;
     start_rad_s_.assign(last_rad_.size(), 0.0);
@@ -94,7 +96,7 @@ class ProgramReference {
       case ArmTask::guide: reference_.mode = ArmMode::guiding; break;
       case ArmTask::cartesian:
         reference_.mode = ArmMode::cartesian;
-        reference_.flange = flange;
+        reference_.flange = dynamics.flange(angle_rad);
         break;
       case ArmTask::impedance:
         reference_.mode = ArmMode::impedance;
@@ -162,14 +164,18 @@ class Runner {
   void open_brakes() {
     ArmReference hold;
     std::ranges::copy(angle_rad_, hold.position_rad.begin());
-    for (bool is_released = false; !is_running();) {
+    bool is_released = false;
+    for (bool is_running = false; !is_running;) {
       if (bench_.time_s() > kLongestStart_s)
         throw Error(
             {.place = setup_.arm.name,
              .problem = fmt::format("the joints did not take over their loads within {:g} s "
                                     "after the start",
                                     kLongestStart_s)});
-      tick(hold, {});
+      const auto& output = tick(hold, {});
+      is_running = std::ranges::all_of(
+          std::span(output.joints).first(commands_.size()),
+          [](const auto& joint) { return joint.phase == JointStop::Phase::running; });
       if (!is_released) is_released = controller_.release();
     }
     bench_.start_clock();
@@ -183,18 +189,19 @@ class Runner {
       if (log_.size() % 1000 == 0)
         report_progress(progress, 0.0, fmt::format("the arm moves: {:.0f} s", bench_.time_s()));
       const bool is_stopping = run.cause != ArmStopCause::none;
-      const ArmFrame flange = controller_.dynamics().flange(angle_rad_);
-      const ArmReference& wanted = reference_.next(angle_rad_, speed_rad_s_, flange);
+      const ArmReference& wanted =
+          is_stopping ? reference_.current()
+                      : reference_.next(angle_rad_, speed_rad_s_, controller_.dynamics());
       const ArmLoad load = is_stopping ? ArmLoad{} : reference_.load();
       const auto& output = tick(wanted, load);
-      log_.add(bench_, output, wanted, !is_stopping && reference_.is_position(), load);
+      log_.add(bench_, output, wanted, !is_stopping && reference_.is_position());
       if (!is_stopping) {
         reference_.advance();
         if (output.cause == ArmStopCause::none) continue;
         run.cause = output.cause;
         run.stopped_joint = setup_.arm.joints[output.joint].name;
         run.stopped_s = stop_s = bench_.time_s();
-        stopped_at_m = flange.position_m;
+        stopped_at_m = controller_.dynamics().flange(angle_rad_).position_m;
         continue;
       }
       const Vector3 moved = true_flange() - stopped_at_m;
@@ -211,12 +218,6 @@ class Runner {
   }
 
  private:
-  [[nodiscard]] bool is_running() const {
-    return std::ranges::all_of(
-               phases_,
-               [](JointStop::Phase phase) { return phase == JointStop::Phase::running; }) &&
-           !phases_.empty();
-  }
   [[nodiscard]] Vector3 true_flange() const {
     std::vector<double> angle_rad;
     for (std::size_t j = 0; j < setup_.joints.size(); ++j)
@@ -229,13 +230,10 @@ class Runner {
       if (std::isfinite(bench_.samples()[j].joint_angle_rad))
         angle_rad_[j] = bench_.samples()[j].joint_angle_rad;
     const auto& output = controller_.step(wanted, bench_.samples());
-    phases_.resize(commands_.size());
-    for (std::size_t j = 0; j < commands_.size(); ++j)
-      speed_rad_s_[j] = output.joints[j].speed_rad_s;
     for (std::size_t j = 0; j < commands_.size(); ++j) {
       const ArmController::JointOutput& joint = output.joints[j];
       commands_[j] = {joint.current_A, joint.is_powered, joint.is_brake_open};
-      phases_[j] = joint.phase;
+      speed_rad_s_[j] = joint.speed_rad_s;
       MonitoredTorque* const monitored = controller_.monitored(j);
       if (monitored != nullptr && monitored->monitor().state() == Monitor::State::ready)
         monitored->monitor().arm(bench_.time_s());
@@ -251,7 +249,6 @@ class Runner {
   ProgramReference reference_;
   ArmLog log_;
   std::vector<ArmBench::Command> commands_;
-  std::vector<JointStop::Phase> phases_;
   std::vector<double> angle_rad_;
   std::vector<double> speed_rad_s_;
 };

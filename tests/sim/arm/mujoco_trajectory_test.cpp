@@ -2,21 +2,18 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
-#include <mujoco/mujoco.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <memory>
-#include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "sim/arm/arm_plant.hpp"
 #include "support/arm_drives.hpp"
-#include "support/temporary_folder.hpp"
+#include "support/mujoco_model.hpp"
 
 namespace torsio {
 namespace {
@@ -47,25 +44,19 @@ double stiffness(const PlantParameters& drive) {
 }
 
 std::string model_text(const ArmModel& arm, const std::vector<PlantParameters>& drives) {
-  std::string text =
-      "<mujoco><compiler angle='radian' inertiafromgeom='false' balanceinertia='false'/>"
-      "<option timestep='1e-4' integrator='Euler'>"
-      "<flag contact='disable' constraint='disable'/></option><worldbody>";
+  std::string text = test::mujoco_begin(arm);
   for (std::size_t j = 0; j < arm.joints.size(); ++j) {
     const ArmJoint& joint = arm.joints[j];
-    const bool is_last = j + 1 == arm.joints.size();
-    const BodyInertia body =
-        is_last ? together(joint.body, moved(arm.payload, arm.flange)) : joint.body;
     const double ratio = total_ratio(drives[j]);
     text += fmt::format(
         "<body pos='{}'><inertial pos='0 0 0' mass='1e-9' diaginertia='1e-12 1e-12 1e-12'/>"
         "<joint type='hinge' axis='{}' armature='{}'/>"
-        "<body><inertial pos='{}' mass='{}' fullinertia='{}'/>"
+        "<body>{}"
         "<joint type='hinge' axis='{}' stiffness='{}'/>",
         fmt::join(joint.origin.position_m, " "), fmt::join(joint.axis, " "),
         drives[j].rotor_inertia_kg_m2 * ratio * ratio + drives[j].middle_inertia_kg_m2,
-        fmt::join(body.com_m, " "), body.mass_kg, fmt::join(body.inertia_kg_m2, " "),
-        fmt::join(joint.axis, " "), stiffness(drives[j]));
+        test::mujoco_inertial(test::loaded_link(arm, j)), fmt::join(joint.axis, " "),
+        stiffness(drives[j]));
   }
   for (std::size_t j = 0; j < 2 * arm.joints.size(); ++j) text += "</body>";
   return text + "</worldbody></mujoco>";
@@ -86,15 +77,8 @@ TEST(MujocoOracle, TrajectoriesOfTwelveDegreesOfFreedomAgree) {
   std::vector<PlantState> start(drives.size());
   ASSERT_EQ(plant.reset(start), Fault::none);
 
-  const TemporaryFolder folder;
-  std::array<char, 1000> message{};
-  const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(
-      mj_loadXML(folder.file("arm.xml", model_text(arm, drives)).c_str(), nullptr, message.data(),
-                 message.size()),
-      mj_deleteModel);
-  ASSERT_TRUE(model) << message.data();
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model.get()),
-                                                               mj_deleteData);
+  const test::MujocoModel oracle(model_text(arm, drives));
+  mjData* const data = oracle.data.get();
   double worst_rad = 0.0;
   double moved_rad = 0.0;
   std::vector<PlantCommand> commands(drives.size());
@@ -111,7 +95,7 @@ TEST(MujocoOracle, TrajectoriesOfTwelveDegreesOfFreedomAgree) {
           motor_torque(drives[j], j, time_s, data->qpos[2 * j], data->qvel[2 * j]);
     }
     ASSERT_EQ(plant.step(commands, {}, kStep_s), Fault::none);
-    mj_step(model.get(), data.get());
+    mj_step(oracle.model.get(), data);
     for (std::size_t j = 0; j < drives.size(); ++j) {
       const double angle_rad = data->qpos[2 * j] + data->qpos[2 * j + 1];
       worst_rad = std::max(worst_rad, std::abs(plant.state(j).joint_angle_rad - angle_rad));
