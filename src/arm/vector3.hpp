@@ -34,12 +34,9 @@ inline Vector3 rotated_back(const Matrix3& r, const Vector3& x) noexcept {
 }
 inline Matrix3 product(const Matrix3& a, const Matrix3& b) noexcept {
   Matrix3 of;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      of[static_cast<std::size_t>(3 * i + j)] =
-          a[static_cast<std::size_t>(3 * i)] * b[static_cast<std::size_t>(j)] +
-          a[static_cast<std::size_t>(3 * i + 1)] * b[static_cast<std::size_t>(3 + j)] +
-          a[static_cast<std::size_t>(3 * i + 2)] * b[static_cast<std::size_t>(6 + j)];
+  for (std::size_t row = 0; row < 9; row += 3)
+    for (std::size_t j = 0; j < 3; ++j)
+      of[row + j] = a[row] * b[j] + a[row + 1] * b[3 + j] + a[row + 2] * b[6 + j];
   return of;
 }
 inline Matrix3 transposed(const Matrix3& r) noexcept {
