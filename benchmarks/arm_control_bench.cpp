@@ -7,6 +7,7 @@
 #include "rows.hpp"
 #include "sim/arm/arm_bench.hpp"
 #include "support/monitored_joint.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
 #include "torsio/sim/arm/arm_run.hpp"
@@ -16,7 +17,6 @@ namespace {
 
 constexpr double kRate_Hz = 1000.0;
 constexpr std::size_t kTicks = 12'000;
-constexpr double kWide_Nm = 1e4;  // limits of monitors that never stop
 
 /// One model for each joint, trained on the moves of the arm.
 std::vector<ModelFile> models_of_joints(const char* family) {
@@ -36,14 +36,8 @@ MonitoredTorque monitored(const ModelFile& model) {
   std::vector<Estimator> sources = test::joint_sources();
   sources.pop_back();
   sources.push_back(make_estimator(model, kRate_Hz));
-  MonitorSettings monitor = test::joint_monitor();
-  for (PairLimits& pair : monitor.pairs) pair.floor_Nm = kWide_Nm;
-  for (MonitoredSignal& signal : monitor.signals) {
-    signal.lowest = -kWide_Nm;
-    signal.highest = kWide_Nm;
-  }
-  monitor.actions.fill(MonitorAction::warn);
-  return {test::torque_sources(std::move(sources)), test::joint_redundancy(), monitor};
+  return {test::torque_sources(std::move(sources)), test::joint_redundancy(),
+          test::tolerant_monitor()};
 }
 
 ArmController controller(const std::vector<ModelFile>& models, bool is_monitored) {
@@ -90,6 +84,8 @@ std::vector<Tick> ticks_of_a_run(const std::vector<ModelFile>& models) {
     if (!is_released) tick.is_release = is_released = arm.release();
     bench.act(commands, {});
     ticks.push_back(std::move(tick));
+    if (n + 1 == kTicks && !output.is_ready)
+      throw Error({.place = "bench of the arm's controller", .problem = "the arm was stopped"});
   }
   return ticks;
 }

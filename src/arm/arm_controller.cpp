@@ -133,6 +133,9 @@ bool ArmController::release() noexcept {
     if (axis.lost > 0 || (axis.stop.phase() != JointStop::Phase::running && !axis.stop.release()))
       return false;
   output_.cause = ArmStopCause::none;
+  for (Axis& axis : joints_)
+    if (axis.monitored) axis.monitored->monitor().reset(axis.t_s);
+  proof_s_ = 0.0;
   hold();
   return true;
 }
@@ -155,12 +158,14 @@ const ArmController::Output& ArmController::step(const ArmReference& reference,
     hold();
     is_started_ = true;
   }
+  prove();
+  const bool is_stopped = output_.cause != ArmStopCause::none;
   output_.is_reference_refused = !is_usable(reference) || !is_near(reference);
-  is_following_ = !output_.is_reference_refused && output_.cause == ArmStopCause::none &&
-                  reference.mode == ArmMode::position;
+  const bool is_held = output_.is_reference_refused || (!output_.is_ready && !is_stopped);
+  is_following_ = !is_held && !is_stopped && reference.mode == ArmMode::position;
   if (output_.is_reference_refused && !is_holding_) hold();
   is_holding_ = output_.is_reference_refused;
-  references(output_.is_reference_refused ? holding_ : reference);
+  references(is_held ? holding_ : reference);
 
   output_.is_at_rest = true;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -199,6 +204,7 @@ bool ArmController::sense(std::span<const JointSample> samples) noexcept {
       continue;
     }
     axis.lost = 0;
+    axis.t_s = samples[j].t_s;
     angle_rad_[j] = samples[j].joint_angle_rad;
     speed_rad_s_[j] = axis.speed.step(angle_rad_[j]);
     raw_speed_rad_s_[j] = axis.raw_speed.step(angle_rad_[j]);
@@ -259,6 +265,25 @@ void ArmController::supervise(std::span<const JointSample> samples) noexcept {
     const bool is_overloaded = std::abs(output_.joints[j].external_Nm) > axis.largest_external_Nm;
     axis.overloaded_s = is_overloaded ? axis.overloaded_s + period_s_ : 0.0;
     if (axis.overloaded_s > settings_.longest_overload_s) find(ArmStopCause::overload, j);
+  }
+}
+
+// The phases are those after the last step.
+void ArmController::prove() noexcept {
+  output_.is_ready = false;
+  if (output_.cause != ArmStopCause::none) return;
+  for (const Axis& axis : joints_)
+    if (axis.stop.phase() != JointStop::Phase::running) return;
+  proof_s_ += period_s_;
+  output_.is_ready = true;
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Axis& axis = joints_[j];
+    if (!axis.monitored) continue;
+    Monitor& monitor = axis.monitored->monitor();
+    if (monitor.state() == Monitor::State::ready) monitor.arm(axis.t_s);
+    if (monitor.is_watching()) continue;
+    output_.is_ready = false;
+    if (proof_s_ > settings_.longest_proof_s) find(ArmStopCause::monitor, j);
   }
 }
 

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "program/program.hpp"
+#include "support/file_bytes.hpp"
 
 namespace torsio::test {
 namespace {
@@ -47,6 +48,65 @@ TEST_F(Arm, StopsAfterAFaultInOneJoint) {
   EXPECT_EQ(document["stop"], "measurement");
   EXPECT_EQ(document["stopped_joint"], "joint2");
   EXPECT_LT(document["flange_moved_m"], 0.05);
+}
+
+// With closed brakes the torque of the current is not that of the spring: the monitor is proven once they are open.
+TEST_F(Arm, IsStoppedByTheMonitorOfAJoint) {
+  std::string steps;
+  for (int k = 0; k < 3; ++k)
+    steps +=
+        "  - move: [60deg, -95deg, 40deg, 40deg, 70deg, 0deg]\n"
+        "  - move: [-60deg, -15deg, 110deg, -60deg, -60deg, 0deg]\n"
+        "  - guide: 3s\n"
+        "  - move: [20deg, -70deg, 20deg, 0deg, 40deg, 0deg]\n"
+        "  - move: [0deg, -20deg, 60deg, 0deg, 40deg, 0deg]\n"
+        "  - move: [0deg, -60deg, 100deg, 0deg, 40deg, 0deg]\n"
+        "  - guide: 3s\n    push: {force: [0N, 10N, -20N], at: 1s, for: 0.5s}\n";
+  write_program(steps);
+  for (const std::string seed : {"1", "2"})
+    ASSERT_EQ(torsio("arm --program moves.yaml --rigid-gears --seed " + seed + " --joints " + seed)
+                  .exit_code,
+              0);
+  const std::string speed = "lowpass(rate(motor_angle_rad), 50Hz)";
+  for (const std::string& fit :
+       {"current.safetensors --inputs 'lowpass(motor_current_A, 50Hz), rate(" + speed + "), " +
+            speed + ", lowpass(dahl(motor_angle_rad, 0.02), 50Hz)'",
+        std::string("spring.safetensors --inputs 'lowpass(spring_deflection_rad, 50Hz)'")})
+    ASSERT_EQ(torsio("fit 1/joint2.csv --model linear --set rates=true -o " + fit).exit_code, 0);
+  const Outcome calibrated = torsio(
+      "monitor --calibrate 1/joint2.csv 2/joint2.csv -o joint2.monitor.json --source "
+      "spring=spring.safetensors:gear_encoder+joint_encoder --source "
+      "current=current.safetensors:current_sensor+motor_encoder --valid-until 2099-01-01 "
+      "--false-alarms-per-hour 200");
+  ASSERT_EQ(calibrated.exit_code, 0) << calibrated.err;
+  std::string arm = file_bytes(std::string(TORSIO_SOURCE) + "/share/torsio/arm6.yaml");
+  folder_.file("arm6.urdf", file_bytes(std::string(TORSIO_SOURCE) + "/share/torsio/arm6.urdf"));
+  const std::string joint = "joint2: {actuator: dfki-300";
+  ASSERT_NE(arm.find(joint), std::string::npos);
+  folder_.file("arm.yaml",
+               arm.insert(arm.find(joint) + joint.size(), ", monitor: joint2.monitor.json"));
+
+  write_program("  - guide: 2s\n    push: {force: [0N, 10N, -20N], at: 0.5s, for: 1s}\n");
+  const auto run = [&](const std::string& call) {
+    const Outcome outcome = torsio("arm " + call + " --program moves.yaml --rigid-gears --json -");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  EXPECT_EQ(run("arm.yaml")["stop"], "none");
+  const std::string fault = " --fault joint2:gear_angle=freeze@1s";
+  const auto alone = run("arm6" + fault);
+  const auto watched = run("arm.yaml" + fault);
+  EXPECT_EQ(alone["stop"], "overload");
+  EXPECT_EQ(watched["stop"], "monitor");
+  EXPECT_EQ(watched["stopped_joint"], "joint2");
+  EXPECT_NE(watched["stop_reason"], "monitor");
+  EXPECT_LT(watched["flange_moved_m"], 0.5 * alone["flange_moved_m"].get<double>());
+
+  // The monitor of another joint.
+  arm.erase(arm.find(", monitor"), std::string(", monitor: joint2.monitor.json").size());
+  folder_.file("arm.yaml", arm.insert(arm.find("joint3: {actuator: dfki-120") + 27,
+                                      ", monitor: joint2.monitor.json"));
+  expect_refusal("arm.yaml --program moves.yaml --rigid-gears", "joint 'joint3'");
 }
 
 TEST_F(Arm, DescribesTheArm) {

@@ -54,6 +54,19 @@ inline MonitorSettings joint_monitor() {
           .correlation = {}};
 }
 
+/// As `joint_monitor`, with limits that no sound joint reaches whatever its sources estimate.
+inline MonitorSettings tolerant_monitor() {
+  constexpr double kWide = 1e4;
+  MonitorSettings monitor = joint_monitor();
+  for (PairLimits& pair : monitor.pairs) pair.floor_Nm = kWide;
+  for (MonitoredSignal& signal : monitor.signals) {
+    signal.lowest = -kWide;
+    signal.highest = kWide;
+  }
+  monitor.actions.fill(MonitorAction::warn);
+  return monitor;
+}
+
 /// Sources without friction.
 inline TorqueSources torque_sources(std::vector<Estimator> estimators) {
   std::vector<SourceModel> models;

@@ -111,11 +111,13 @@ std::string description(const torsio::ArmSetup& setup) {
 
 std::string stop_text(const torsio::ArmRun& run) {
   if (run.cause == torsio::ArmStopCause::none) return "The program was carried out to its end.";
-  return fmt::format("The arm stopped at {:.3f} s: {} in {}; {}, the flange moved by {:.1f} mm.",
-                     run.stopped_s, torsio::name(run.cause), run.stopped_joint,
-                     run.at_rest_s ? fmt::format("at rest after {:.2f} s", *run.at_rest_s)
-                                   : std::string("not at rest"),
-                     1e3 * run.largest_drop_m);
+  const std::string cause(torsio::name(run.cause));
+  return fmt::format(
+      "The arm stopped at {:.3f} s: {} in {}; {}, the flange moved by {:.1f} mm.", run.stopped_s,
+      run.stop_reason == cause ? cause : cause + " (" + run.stop_reason + ")", run.stopped_joint,
+      run.at_rest_s ? fmt::format("at rest after {:.2f} s", *run.at_rest_s)
+                    : std::string("not at rest"),
+      1e3 * run.largest_drop_m);
 }
 
 std::string score_text(const torsio::ArmRun& run) {
@@ -133,6 +135,7 @@ Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
       {"duration_s", run.duration_s},
       {"stop", torsio::name(run.cause)},
       {"stopped_joint", run.stopped_joint.empty() ? Json(nullptr) : Json(run.stopped_joint)},
+      {"stop_reason", run.stop_reason.empty() ? Json(nullptr) : Json(run.stop_reason)},
       {"stopped_s", run.cause == torsio::ArmStopCause::none ? Json(nullptr) : Json(run.stopped_s)},
       {"at_rest_after_s", run.at_rest_s ? Json(*run.at_rest_s) : Json(nullptr)},
       {"flange_moved_m", run.largest_drop_m},
@@ -152,13 +155,16 @@ Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
   return document;
 }
 
-void write_joints(const ArmFlags& flags, const torsio::ArmRun& run,
-                  const torsio::Progress& progress) {
+void make_folder(const std::string& folder) {
   std::error_code error;
-  std::filesystem::create_directories(flags.folder, error);
+  std::filesystem::create_directories(folder, error);
   if (error)
     throw torsio::Error(
-        {.place = flags.folder, .problem = "the folder cannot be made: " + error.message()});
+        {.place = folder, .problem = "the folder cannot be made: " + error.message()});
+}
+
+void write_joints(const ArmFlags& flags, const torsio::ArmRun& run,
+                  const torsio::Progress& progress) {
   for (std::size_t j = 0; j < run.joints.size(); ++j) {
     const std::string path =
         (std::filesystem::path(flags.folder) / fmt::format("joint{}.csv", j + 1)).string();
@@ -189,6 +195,7 @@ void run(const ArmFlags& flags) {
       .seed = flags.seed,
       .has_gear_stage = !flags.has_rigid_gears,
       .with_truth = flags.with_truth};
+  if (!flags.folder.empty()) make_folder(flags.folder);
   const torsio::ArmRun done = torsio::run_arm(setup, spec, progress.listener());
   if (!flags.output.empty()) {
     torsio::write_recording(done.record, flags.output, progress.listener());

@@ -46,7 +46,7 @@ enum class ArmStopCause : std::uint8_t {
   none,
   requested,    ///< by `ArmController::stop`
   measurement,  ///< a joint's sample was not finite for too many ticks
-  monitor,      ///< the monitor of a joint
+  monitor,      ///< the monitor of a joint, or it was not ready in time
   overload,     ///< the external torque of a joint exceeded its limit for too long
 };
 
@@ -73,6 +73,9 @@ enum class ArmStopCause : std::uint8_t {
 ///
 /// A fault in one joint stops all of them: each goes to rest by its own `JointStop`, a joint without a usable measurement
 /// without power and with its brake. The stop is latched until `release`.
+///
+/// After `release` the arm holds until all joints run and every monitor watches: with closed brakes the torque of a
+/// motor's current differs from that of the spring, so that the monitors are proven after the brakes are open.
 ///
 /// Paper 000 section 6.4 has the arm; the control of the whole arm is ours.
 class ArmController {
@@ -112,6 +115,7 @@ class ArmController {
     std::uint32_t tolerated_losses =
         3;  ///< ticks in a row in which a joint's sample may be missing
     double longest_overload_s = 0.02;
+    double longest_proof_s = 1.0;  ///< until the monitors watch, from when all joints run
     StopCategory stop_category =
         StopCategory::ramp_and_brake;  ///< category of a stop after a fault
   };
@@ -134,6 +138,7 @@ class ArmController {
     ArmStopCause cause = ArmStopCause::none;  ///< cause of the stop that is in effect
     std::size_t joint = 0;                    ///< in which it was found
     bool is_at_rest = false;                  ///< all drives, measured, after a stop
+    bool is_ready = false;  ///< all joints run, and every monitor watches: references are followed
     bool is_reference_refused =
         false;                    ///< not finite, or a mode that is not configured: the arm holds
     double manipulability = 1.0;  ///< cartesian
@@ -164,7 +169,8 @@ class ArmController {
     return dynamics_.set_payload(payload);
   }
   [[nodiscard]] std::size_t size() const noexcept { return joints_.size(); }
-  [[nodiscard]] MonitoredTorque* monitored(std::size_t joint) noexcept {
+  /// @returns none for a joint without a monitor
+  [[nodiscard]] const MonitoredTorque* monitored(std::size_t joint) const noexcept {
     return joints_[joint].monitored ? &*joints_[joint].monitored : nullptr;
   }
 
@@ -189,9 +195,10 @@ class ArmController {
     double largest_external_Nm;
     double guiding_friction_Nm;
     double correction_rad = 0.0;
-    double guided_rad = 0.0;   ///< e
-    JointState measured = {};  ///< motor side over the ratio, and the linear spring
-    std::uint32_t lost = 0;    ///< ticks in a row without a sample
+    double guided_rad = 0.0;    ///< e
+    JointState measured = {};   ///< motor side over the ratio, and the linear spring
+    double t_s = kNotMeasured;  ///< clock of the last sample
+    std::uint32_t lost = 0;     ///< ticks in a row without a sample
     double overloaded_s = 0.0;
   };
 
@@ -200,6 +207,7 @@ class ArmController {
   void estimate(std::span<const JointSample> samples) noexcept;
   void supervise(std::span<const JointSample> samples) noexcept;
   void find(ArmStopCause cause, std::size_t joint) noexcept;
+  void prove() noexcept;
   [[nodiscard]] bool is_usable(const ArmReference& reference) const noexcept;
   [[nodiscard]] bool is_near(const ArmReference& reference) const noexcept;
   void hold() noexcept;
@@ -221,7 +229,8 @@ class ArmController {
   ArmDynamics::PerJoint raw_speed_rad_s_ = {};
   std::array<JointReference, kMaxArmJoints> references_ = {};
   ArmReference holding_ =
-      {};  ///< where the arm was at the first step, or when a reference was refused
+      {};                 ///< where the arm was at the first step, or when a reference was refused
+  double proof_s_ = 0.0;  ///< since all joints run
   bool is_started_ = false;
   bool is_holding_ = false;
   bool is_guided_ = false;  ///< in the last tick

@@ -38,14 +38,14 @@ class ArmBench {
     return joints_[joint].measured;
   }
   [[nodiscard]] std::span<const JointSample> samples() const noexcept { return samples_; }
-  /// Faults begin to count from here.
-  void start_clock() noexcept { tick_ = 0; }
+  /// `time_s`, and with it the faults, counts from here; the clock of the samples does not jump.
+  void start_clock() noexcept { start_tick_ = tick_; }
   /// Advances to the next tick. @throws Error if the arm refuses.
   void act(std::span<const Command> commands, const ArmLoad& load);
 
   [[nodiscard]] const ArmPlant& plant() const noexcept { return plant_; }
   [[nodiscard]] double time_s() const noexcept {
-    return static_cast<double>(tick_) / kBenchRate_Hz;
+    return static_cast<double>(tick_ - start_tick_) / kBenchRate_Hz;
   }
 
  private:
@@ -70,6 +70,7 @@ class ArmBench {
   std::vector<JointSample> samples_;
   std::vector<PlantCommand> commands_;
   std::size_t tick_ = 0;
+  std::size_t start_tick_ = 0;
 };
 
 }  // namespace torsio

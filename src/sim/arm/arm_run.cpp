@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "arm/vector3.hpp"
@@ -165,17 +166,22 @@ class Runner {
     ArmReference hold;
     std::ranges::copy(angle_rad_, hold.position_rad.begin());
     bool is_released = false;
-    for (bool is_running = false; !is_running;) {
+    for (bool is_ready = false; !is_ready;) {
+      const auto& output = tick(hold, {});
+      is_ready = output.is_ready;
+      if (is_released && output.cause != ArmStopCause::none)
+        throw Error(
+            {.place = fmt::format("joint '{}'", setup_.arm.joints[output.joint].name),
+             .problem = "the arm was stopped before it was ready: " + stop_reason(output),
+             .advice = output.cause == ArmStopCause::monitor
+                           ? "Calibrate its monitor with recordings of this joint in this arm."
+                           : ""});
       if (bench_.time_s() > kLongestStart_s)
         throw Error(
             {.place = setup_.arm.name,
              .problem = fmt::format("the joints did not take over their loads within {:g} s "
                                     "after the start",
                                     kLongestStart_s)});
-      const auto& output = tick(hold, {});
-      is_running = std::ranges::all_of(
-          std::span(output.joints).first(commands_.size()),
-          [](const auto& joint) { return joint.phase == JointStop::Phase::running; });
       if (!is_released) is_released = controller_.release();
     }
     bench_.start_clock();
@@ -200,6 +206,7 @@ class Runner {
         if (output.cause == ArmStopCause::none) continue;
         run.cause = output.cause;
         run.stopped_joint = setup_.arm.joints[output.joint].name;
+        run.stop_reason = stop_reason(output);
         run.stopped_s = stop_s = bench_.time_s();
         stopped_at_m = controller_.dynamics().flange(angle_rad_).position_m;
         continue;
@@ -224,6 +231,13 @@ class Runner {
       angle_rad.push_back(bench_.plant().state(j).joint_angle_rad);
     return controller_.dynamics().flange(angle_rad).position_m;
   }
+  [[nodiscard]] std::string stop_reason(const ArmController::Output& output) const {
+    if (output.cause != ArmStopCause::monitor) return std::string(name(output.cause));
+    const Monitor& monitor = controller_.monitored(output.joint)->monitor();
+    if (monitor.state() != Monitor::State::stopped)
+      return "its monitor is not ready; while the arm holds, its sources differ or are not settled";
+    return describe(monitor.reason(), monitor.settings());
+  }
   const ArmController::Output& tick(const ArmReference& wanted, const ArmLoad& load) {
     bench_.sense();
     for (std::size_t j = 0; j < angle_rad_.size(); ++j)
@@ -234,9 +248,6 @@ class Runner {
       const ArmController::JointOutput& joint = output.joints[j];
       commands_[j] = {joint.current_A, joint.is_powered, joint.is_brake_open};
       speed_rad_s_[j] = joint.speed_rad_s;
-      MonitoredTorque* const monitored = controller_.monitored(j);
-      if (monitored != nullptr && monitored->monitor().state() == Monitor::State::ready)
-        monitored->monitor().arm(bench_.time_s());
     }
     log_.see(bench_);
     bench_.act(commands_, load);

@@ -105,6 +105,7 @@ struct ArmRun {
   double duration_s = 0.0;
   ArmStopCause cause = ArmStopCause::none;
   std::string stopped_joint = {};        ///< where it was found
+  std::string stop_reason = {};          ///< what was found, in words
   double stopped_s = 0.0;                ///< when; 0: not stopped
   std::optional<double> at_rest_s = {};  ///< from the stop until all drives were at rest
   double largest_drop_m = 0.0;           ///< how far the flange moved after the stop
