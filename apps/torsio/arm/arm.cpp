@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "arm/arm_verbs.hpp"
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
@@ -26,8 +27,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kReadyArm = "arm6";
-
 struct ArmFlags {
   std::string arm = kReadyArm;
   std::string program;
@@ -45,8 +44,7 @@ struct ArmFlags {
 };
 
 torsio::ArmSetup setup_of(const ArmFlags& flags, const torsio::Progress& progress) {
-  torsio::ArmSetup setup =
-      flags.arm == kReadyArm ? torsio::arm6_setup() : torsio::read_arm(flags.arm, progress);
+  torsio::ArmSetup setup = arm_of(flags.arm, progress);
   if (!flags.tilt.empty())
     setup.arm.gravity_m_s2 =
         torsio::tilted_gravity(torsio::si_quantity(flags.tilt, "rad", "--tilt"));
@@ -219,6 +217,7 @@ void add_arm(CLI::App& app) {
       "Example: torsio arm -o arm.csv --report arm.html\n"
       "         torsio arm my_arm.yaml --program moves.yaml --joints recordings/\n"
       "         torsio arm --fault joint2:joint_angle=nan@9s\n"
+      "         torsio arm identify arm.csv\n"
       "docs/robot/arm.md has the format of arms and programs.");
   verb->add_option(
           "ARM", flags->arm,
@@ -251,5 +250,8 @@ void add_arm(CLI::App& app) {
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
   flags->report.add(*verb);
-  verb->callback([flags] { run(*flags); });
+  add_arm_identify(*verb);
+  verb->callback([flags, verb] {
+    if (verb->get_subcommands().empty()) run(*flags);
+  });
 }

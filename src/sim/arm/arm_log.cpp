@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <utility>
+
+#include "sim/arm/joint_channels.hpp"
 
 namespace torsio {
 namespace {
@@ -24,13 +25,6 @@ constexpr std::array kControlNames{"wanted_angle_rad",
                                    "truth_torque_Nm",
                                    "truth_external_torque_Nm"};
 constexpr std::size_t kTruthNames = 3;
-
-/// The name of a joint as the beginning of a channel's.
-std::string prefix(std::string name) {
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
-  return name + "_";
-}
 
 double root_mean(double squares, std::size_t count) {
   return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));
@@ -102,13 +96,13 @@ void ArmLog::add(const ArmBench& bench, const ArmController::Output& output,
 }
 
 std::string ArmRun::joint_channel(std::size_t joint, std::string_view channel) const {
-  return prefix(scores[joint].joint) + std::string(channel);
+  return joint_prefix(scores[joint].joint) + std::string(channel);
 }
 
 void ArmLog::finish(ArmRun& run) && {
   for (Joint& joint : joints_) {
     Recording own(joint.score.joint, kBenchRate_Hz);
-    const std::string before = prefix(joint.score.joint);
+    const std::string before = joint_prefix(joint.score.joint);
     for (std::size_t i = 0; i < joint.sensed.size(); ++i) {
       Channel channel{.name = joint.sensed[i].name, .values = std::move(joint.sensed[i].values)};
       if (i + 1 == joint.sensed.size()) channel.fresh = joint.torque_fresh;  // the torque's
