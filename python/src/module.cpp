@@ -70,4 +70,5 @@ PYBIND11_MODULE(_core, module) {
   bind_batches(module);
   bind_learning(module);
   bind_control(module);
+  bind_arms(module);
 }

@@ -130,7 +130,7 @@ ArmSetup parse(const YamlValue& yaml, const std::filesystem::path& folder, const
   return setup;
 }
 
-std::string text_of_file(const std::string& path) {
+std::string text_of_file(const std::string& path, const std::string& advice) {
   try {
     const std::vector<std::byte> bytes = read_whole_file(path, kMaxUrdfBytes);
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -138,7 +138,7 @@ std::string text_of_file(const std::string& path) {
     ErrorReport report = error.report();
     report.problem =
         report.problem.empty() ? "cannot be read" : "cannot be read: " + report.problem;
-    report.advice = "The path in 'urdf' is relative to the file of the arm.";
+    report.advice = advice;
     throw Error(std::move(report));
   }
 }
@@ -164,9 +164,15 @@ JointControllerCore::Settings control_of(const ArmJoint& joint, const DataSheet&
 }  // namespace
 
 ArmSetup read_arm(const std::string& path, const Progress& progress) {
-  return parse(YamlValue::read(path, progress), std::filesystem::path(path).parent_path(),
-               text_of_file, progress);
+  return parse(
+      YamlValue::read(path, progress), std::filesystem::path(path).parent_path(),
+      [](const std::string& file) {
+        return text_of_file(file, "The path in 'urdf' is relative to the file of the arm.");
+      },
+      progress);
 }
+
+ArmModel read_urdf_file(const std::string& path) { return read_urdf(text_of_file(path, ""), path); }
 
 ArmSetup arm6_setup() {
   return parse(YamlValue::parse(kArm6Yaml, "arm6.yaml"), {},

@@ -41,6 +41,10 @@ struct ArmSetup {
 /// weight alone needs more than `kLargestStaticShare` of a joint's rating.
 [[nodiscard]] ArmSetup read_arm(const std::string& path, const Progress& progress = {});
 
+/// @returns the arm of a URDF file
+/// @throws Error as `read_urdf`, or if the file cannot be read
+[[nodiscard]] ArmModel read_urdf_file(const std::string& path);
+
 /// The arm of paper 000, section 6.4, with a payload of 8 kg: two joints of 300 Nm, one of 120 Nm, three of 28 Nm. Its
 /// geometry and masses are assumed (docs/robot/arm.md). The files share/torsio/arm6.yaml and arm6.urdf are the same arm.
 [[nodiscard]] ArmSetup arm6_setup();
