@@ -8,71 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "bindings.hpp"
+#include "arm_rows.hpp"
 #include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/sim/arm/arm_setup.hpp"
 
 namespace torsio::python {
 namespace {
-
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using Shape = std::vector<py::ssize_t>;
-
-/// Numbers of shape (..., joints): one row per pose, however many leading dimensions there are.
-class JointRows {
- public:
-  JointRows(const py::handle& object, std::size_t joints, const std::string& name)
-      : joints_(joints), array_(Array::ensure(unmasked(object))) {
-    if (!array_) PyErr_Clear();
-    if (!array_ || array_.ndim() < 1 ||
-        array_.shape(array_.ndim() - 1) != static_cast<py::ssize_t>(joints))
-      throw UsageError({.place = name,
-                        .expected = "numbers of shape (..., " + std::to_string(joints) +
-                                    "), one per joint of the arm",
-                        .found = kind_of(object)});
-  }
-
-  [[nodiscard]] std::size_t size() const {
-    return static_cast<std::size_t>(array_.size()) / joints_;
-  }
-  [[nodiscard]] Shape leading() const {
-    return {array_.shape(), array_.shape() + array_.ndim() - 1};
-  }
-  [[nodiscard]] std::span<const double> row(std::size_t index) const {
-    return {array_.data() + index * joints_, joints_};
-  }
-  /// @throws UsageError if the leading dimensions differ
-  void require_like(const JointRows& other, const std::string& name) const {
-    if (leading() == other.leading()) return;
-    throw UsageError({.place = name,
-                      .expected = "the shape of the angles, " + kind_of(other.array_),
-                      .found = kind_of(array_)});
-  }
-
- private:
-  std::size_t joints_;
-  Array array_;
-};
-
-/// A new array of shape (..., tail), written row by row.
-class RowsOut {
- public:
-  RowsOut(Shape leading, const Shape& tail) {
-    for (const py::ssize_t width : tail) width_ *= static_cast<std::size_t>(width);
-    leading.insert(leading.end(), tail.begin(), tail.end());
-    array = py::array_t<double>(leading);
-    data_ = array.mutable_data();
-  }
-  [[nodiscard]] std::span<double> row(std::size_t index) const {
-    return {data_ + index * width_, width_};
-  }
-
-  py::array_t<double> array;
-
- private:
-  std::size_t width_ = 1;
-  double* data_ = nullptr;
-};
 
 Vector3 vector_of(const py::handle& object, const std::string& name) {
   const JointRows rows(object, 3, name);
@@ -219,8 +160,6 @@ struct pybind11::detail::type_caster<torsio::python::Arm> : InitialisedCaster<to
 namespace torsio::python {
 namespace {
 
-constexpr const char* kReadyArm = "arm6";
-
 std::unique_ptr<Arm> arm_of(const py::object& arm) {
   const std::string file = path_text(arm);
   if (file == kReadyArm) return std::make_unique<Arm>(arm6_setup().arm);
@@ -279,6 +218,7 @@ void bind_arms(py::module_& module) {
            py::arg("acceleration_rad_s2"), "The torques of a motion [Nm], (..., joints).")
       .def("forward", &Arm::forward, py::arg("angle_rad"), py::arg("speed_rad_s"),
            py::arg("torque_Nm"), "The accelerations under torques [rad/s2], (..., joints).");
+  bind_arm_simulation(module);
 }
 
 }  // namespace torsio::python

@@ -107,3 +107,77 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
     broken.write_text("<robot><link/></robot>")
     with pytest.raises(torsio.Error, match="broken.urdf"):
         torsio.Arm.from_urdf(broken)
+
+
+def hold(simulation: torsio.ArmSimulation, ticks: int, **step) -> dict[str, np.ndarray]:
+    start = np.tile(np.deg2rad([0, -60, 100, 0, 40, 0]), (len(simulation), 1))
+    for _ in range(ticks):
+        state = simulation.step(position_rad=start, **step)
+    return state
+
+
+def test_a_row_is_an_arm_of_its_own():
+    both = hold(torsio.ArmSimulation("arm6", rows=2, seed=5), 50)
+    assert both["joint_angle_rad"].shape == (2, 6) and both["is_stopped"].shape == (2,)
+    second = hold(torsio.ArmSimulation("arm6", rows=1, seed=6), 50)
+    for name in both:
+        np.testing.assert_array_equal(both[name][1], second[name][0], err_msg=name)
+    assert not np.array_equal(both["torque_Nm"][0], both["torque_Nm"][1])
+
+
+def test_a_force_on_the_flange_is_an_external_torque(arm):
+    simulation = torsio.ArmSimulation("arm6", rows=1)
+    before = hold(simulation, 500)
+    after = hold(simulation, 500, force_N=[[0.0, 0.0, -40.0]])
+    jacobian = arm.jacobian(after["joint_angle_rad"][0])
+    expected = jacobian[:3].T @ [0.0, 0.0, -40.0]
+    np.testing.assert_allclose(after["truth_external_torque_Nm"][0], expected, atol=0.2)
+    change = after["external_torque_Nm"][0] - before["external_torque_Nm"][0]
+    assert change[1] == pytest.approx(expected[1], rel=0.3)
+    assert not after["is_stopped"].any() and not after["is_contact"].any()
+    assert np.isnan(after["external_torque_std_dev_Nm"]).all()  # no contacts are looked for
+
+
+def test_an_arm_is_guided_driven_by_torques_and_reset():
+    simulation = torsio.ArmSimulation("arm6", rows=2)
+    hold(simulation, 20)
+    start = hold(simulation, 1)["joint_angle_rad"]
+    for _ in range(300):
+        guided = simulation.step(guided=True, force_N=[[0.0, 40.0, 0.0], [0.0, 0.0, 0.0]])
+    assert abs(guided["joint_angle_rad"] - start)[0].max() > 0.01
+    assert abs(guided["joint_angle_rad"] - start)[1].max() < 0.01
+    simulation.reset(np.array([True, False]))
+    again = simulation.step(guided=True)["joint_angle_rad"]
+    assert abs(again - start)[0].max() < 1e-3
+    weight = torsio.Arm("arm6").gravity(again)
+    driven = simulation.step(torque_Nm=weight)
+    assert np.isfinite(driven["torque_Nm"]).all()
+    simulation.end_reaction()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda of: of.step(),
+        lambda of: of.step(guided=True, torque_Nm=np.zeros((1, 6))),
+        lambda of: of.step(position_rad=np.zeros(6)),
+        lambda of: of.step(position_rad=np.zeros((2, 6))),
+        lambda of: of.step(guided=True, force_N=np.zeros((1, 6))),
+        lambda of: of.reset([True, False]),
+        lambda of: torsio.ArmSimulation("arm6", rows=0),
+        lambda of: torsio.ArmSimulation("arm6", reaction="jump"),
+        lambda of: torsio.ArmSimulation("arm6", reaction="stop"),
+        lambda of: torsio.ArmSimulation("arm6", start_rad=[0.0]),
+    ],
+)
+def test_a_simulation_refuses_what_does_not_fit(call):
+    with pytest.raises(torsio.UsageError):
+        call(torsio.ArmSimulation("arm6"))
+
+
+def test_references_that_are_not_finite_hold_the_arm():
+    simulation = torsio.ArmSimulation("arm6")
+    state = hold(simulation, 20)
+    for _ in range(50):
+        other = simulation.step(position_rad=np.full((1, 6), np.nan))
+    assert abs(other["joint_angle_rad"] - state["joint_angle_rad"]).max() < 0.01

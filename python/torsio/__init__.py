@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from . import _core
 from ._core import (
     Arm,
+    ArmSimulation,
     Batch,
     Dataset,
     Error,
@@ -58,12 +59,13 @@ setattr(Recording, "to_pandas", recording_to_pandas)
 
 __version__ = _core.__version__
 
-for _type in (Arm, Batch, Dataset, Estimate, Estimator, Model, Recording):
+for _type in (Arm, ArmSimulation, Batch, Dataset, Estimate, Estimator, Model, Recording):
     _type.__module__ = "torsio"
 del _type
 
 __all__ = [
     "Arm",
+    "ArmSimulation",
     "Batch",
     "CheckReport",
     "Comparison",

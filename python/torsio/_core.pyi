@@ -202,6 +202,32 @@ class Arm:
         self, angle_rad: npt.ArrayLike, speed_rad_s: npt.ArrayLike, torque_Nm: npt.ArrayLike
     ) -> npt.NDArray[np.float64]: ...
 
+class ArmSimulation:
+    def __init__(
+        self,
+        arm: _Path = ...,
+        *,
+        rows: int = ...,
+        seed: int = ...,
+        rigid_gears: bool = ...,
+        start_rad: npt.ArrayLike | None = ...,
+        contacts: _Path | None = ...,
+        reaction: str = ...,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    def step(
+        self,
+        *,
+        position_rad: npt.ArrayLike | None = ...,
+        speed_rad_s: npt.ArrayLike | None = ...,
+        acceleration_rad_s2: npt.ArrayLike | None = ...,
+        torque_Nm: npt.ArrayLike | None = ...,
+        force_N: npt.ArrayLike | None = ...,
+        guided: bool = ...,
+    ) -> dict[str, npt.NDArray[Any]]: ...
+    def reset(self, mask: npt.NDArray[np.bool_] | None = ...) -> None: ...
+    def end_reaction(self, mask: npt.NDArray[np.bool_] | None = ...) -> None: ...
+
 def read(
     path: _Path, *, mapping: _Path | None = ..., rate_Hz: float | None = ..., target: str = ...
 ) -> list[Recording]: ...

@@ -47,6 +47,7 @@ ArmController::Axis::Axis(Joint&& from, double sample_rate_Hz, double speed_cuto
       motor_speed(sample_rate_Hz, from.control.speed_cutoff_Hz),
       drive(from.control.torque.deflection.joint.drive),
       stiffness_Nm_rad(from.control.torque.deflection.joint.stiffness_Nm_rad),
+      speed_limit_rad_s(from.control.limits.speed_rad_s),
       bearing_Nm(from.bearing_Nm),
       viscous_Nms_rad(from.viscous_Nms_rad),
       largest_external_Nm(from.largest_external_Nm),
@@ -64,7 +65,8 @@ ArmController::ArmController(Settings settings, double sample_rate_Hz)
     : settings_(std::move(settings)),
       period_s_(1.0 / sample_rate_Hz),
       dynamics_(settings_.arm),
-      observer_(settings_.arm.joints.size(), settings_.observer, sample_rate_Hz) {
+      observer_(settings_.arm.joints.size(), settings_.observer, sample_rate_Hz),
+      reaction_(settings_.reaction_motion, sample_rate_Hz) {
   require(settings_.joints.size() == dynamics_.size(), kPlace,
           fmt::format("{} joints, as in the arm", dynamics_.size()),
           fmt::format("{}", settings_.joints.size()));
@@ -78,6 +80,12 @@ ArmController::ArmController(Settings settings, double sample_rate_Hz)
   require_not_negative(kPlace, "the largest correction", settings_.largest_correction_rad);
   require_positive(kPlace, "the longest overload", settings_.longest_overload_s);
   if (settings_.cartesian) cartesian_.emplace(*settings_.cartesian);
+  if (settings_.contacts) {
+    require(settings_.contacts->joints.size() == dynamics_.size(), kPlace,
+            fmt::format("thresholds of contacts for {} joints, as in the arm", dynamics_.size()),
+            fmt::format("{}", settings_.contacts->joints.size()));
+    contacts_.emplace(*settings_.contacts, sample_rate_Hz);
+  }
   joints_.reserve(dynamics_.size());
   for (std::size_t j = 0; j < dynamics_.size(); ++j) {
     try {
@@ -108,6 +116,7 @@ void ArmController::reset() noexcept {
     axis.overloaded_s = 0.0;
   }
   observer_.reset();
+  end_reaction();
   output_ = {.cause = ArmStopCause::requested};
   is_started_ = false;
   is_holding_ = false;
@@ -136,6 +145,7 @@ bool ArmController::release() noexcept {
   for (Axis& axis : joints_)
     if (axis.monitored) axis.monitored->monitor().reset(axis.t_s);
   proof_s_ = 0.0;
+  end_reaction();
   hold();
   return true;
 }
@@ -159,13 +169,15 @@ const ArmController::Output& ArmController::step(const ArmReference& reference,
     is_started_ = true;
   }
   prove();
+  find_contact(reference, samples);
+  const ArmReference& wanted = is_reacting_ ? reaction_reference() : reference;
   const bool is_stopped = output_.cause != ArmStopCause::none;
-  output_.is_reference_refused = !is_usable(reference) || !is_near(reference);
+  output_.is_reference_refused = !is_reacting_ && (!is_usable(reference) || !is_near(reference));
   const bool is_held = output_.is_reference_refused || (!output_.is_ready && !is_stopped);
-  is_following_ = !is_held && !is_stopped && reference.mode == ArmMode::position;
+  is_following_ = !is_held && !is_stopped && wanted.mode == ArmMode::position;
   if (output_.is_reference_refused && !is_holding_) hold();
   is_holding_ = output_.is_reference_refused;
-  references(is_held ? holding_ : reference);
+  references(is_held ? holding_ : wanted);
 
   output_.is_at_rest = true;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -419,28 +431,6 @@ void ArmController::find_swing(ArmDynamics::PerJoint& damping_s,
     acceleration_rad_s2[j] = output_.joints[j].link_Nm + output_.joints[j].external_Nm - bias_Nm[j];
   }
   solve_positive(std::span(mass_kg_m2).first(n * n), std::span(acceleration_rad_s2).first(n));
-}
-
-std::string_view name(ArmMode mode) noexcept {
-  switch (mode) {
-    case ArmMode::joints: return "joints";
-    case ArmMode::position: return "position";
-    case ArmMode::impedance: return "impedance";
-    case ArmMode::cartesian: return "cartesian";
-    case ArmMode::guiding: return "guiding";
-  }
-  return "unknown";
-}
-
-std::string_view name(ArmStopCause cause) noexcept {
-  switch (cause) {
-    case ArmStopCause::none: return "none";
-    case ArmStopCause::requested: return "requested";
-    case ArmStopCause::measurement: return "measurement";
-    case ArmStopCause::monitor: return "monitor";
-    case ArmStopCause::overload: return "overload";
-  }
-  return "unknown";
 }
 
 }  // namespace torsio

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "arm/arm_source.hpp"
 #include "arm/arm_verbs.hpp"
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
@@ -14,6 +15,7 @@
 #include "common/report_output.hpp"
 #include "report/html/arm_figures.hpp"
 #include "report/json_text.hpp"
+#include "torsio/arm/contacts_file.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
@@ -28,13 +30,12 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct ArmFlags {
-  std::string arm = kReadyArm;
+  ArmSource source;
   std::string program;
+  std::string contacts;
   std::string output;
   std::string folder;
   std::vector<std::string> faults;
-  std::string payload;
-  std::string tilt;
   std::uint64_t seed = kDefaultSeed;
   bool has_rigid_gears = false;
   bool with_truth = false;
@@ -42,24 +43,6 @@ struct ArmFlags {
   JsonOutput json;
   ReportOutput report;
 };
-
-torsio::ArmSetup setup_of(const ArmFlags& flags, const torsio::Progress& progress) {
-  torsio::ArmSetup setup = arm_of(flags.arm, progress);
-  if (!flags.tilt.empty())
-    setup.arm.gravity_m_s2 =
-        torsio::tilted_gravity(torsio::si_quantity(flags.tilt, "rad", "--tilt"));
-  if (!flags.payload.empty()) {
-    // The centre of mass stays; the inertia is that of a body of the same shape.
-    const double mass_kg = torsio::si_quantity(flags.payload, "kg", "--payload");
-    torsio::BodyInertia& payload = setup.arm.payload;
-    const double scale = payload.mass_kg > 0.0 ? mass_kg / payload.mass_kg : 0.0;
-    for (double& moment : payload.inertia_kg_m2) moment *= scale;
-    payload.mass_kg = mass_kg;
-  }
-  torsio::require_carriable(setup,
-                            flags.payload.empty() ? flags.arm : "--payload " + flags.payload);
-  return setup;
-}
 
 /// JOINT:WHAT=AMOUNT@TIME, for each joint the faults of it.
 std::vector<torsio::FaultSchedule> faults_of(const ArmFlags& flags, const torsio::ArmSetup& setup) {
@@ -118,15 +101,59 @@ std::string stop_text(const torsio::ArmRun& run) {
       1e3 * run.largest_drop_m);
 }
 
+std::optional<torsio::ContactDetector::Settings> contacts_of(const ArmFlags& flags,
+                                                             const torsio::ArmSetup& setup) {
+  if (flags.contacts.empty()) return {};
+  const torsio::ContactsFile file = torsio::read_contacts(flags.contacts);
+  torsio::require_contacts_of(file, setup.arm, torsio::MomentumObserver::Settings().bandwidth_rad_s,
+                              flags.contacts);
+  return file.settings();
+}
+
+/// One line for each contact, and the forces of a plate.
+std::string contact_text(const torsio::ArmRun& run) {
+  std::string text;
+  for (const torsio::ArmContact& contact : run.contacts)
+    text += fmt::format(
+        "Contact at {:.3f} s in {}, {}; reaction: {}.\n", contact.found_s, contact.joint,
+        contact.latency_s ? fmt::format("{:.0f} ms after it began", 1e3 * *contact.latency_s)
+                          : std::string("a false alarm"),
+        torsio::name(contact.reaction));
+  if (!run.impact) return text;
+  const torsio::ArmImpact& impact = *run.impact;
+  const auto force = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.0f} N", *value) : std::string("not reached");
+  };
+  return text + fmt::format(
+                    "Plate touched at {:.3f} s: first peak {:.0f} N, largest {:.0f} N after "
+                    "{:.0f} ms, largest later than 80 ms {}, after 0.5 s {}.\n",
+                    impact.touched_s, impact.first_peak_N, impact.peak_N, 1e3 * impact.peak_after_s,
+                    force(impact.largest_late_N), force(impact.rest_N));
+}
+
 std::string score_text(const torsio::ArmRun& run) {
   return torsio::arm_scores(run).text() +
          "position, torque, external torque: RMSE to the truth; the position of the links in moves "
          "and holds\n";
 }
 
+Json plate_json(const torsio::ArmRun& run) {
+  if (!run.impact) return nullptr;
+  const torsio::ArmImpact& impact = *run.impact;
+  const auto force = [](const std::optional<double>& value) {
+    return value ? Json(*value) : Json(nullptr);
+  };
+  return {{"touched_s", impact.touched_s},
+          {"first_peak_N", impact.first_peak_N},
+          {"peak_N", impact.peak_N},
+          {"peak_after_s", impact.peak_after_s},
+          {"largest_after_80_ms_N", force(impact.largest_late_N)},
+          {"after_500_ms_N", force(impact.rest_N)}};
+}
+
 Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
   Json document{
-      {"arm", flags.arm},
+      {"arm", flags.source.arm},
       {"program", flags.program},
       {"seed", flags.seed},
       {"gear_stage", !flags.has_rigid_gears},
@@ -138,7 +165,15 @@ Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
       {"at_rest_after_s", run.at_rest_s ? Json(*run.at_rest_s) : Json(nullptr)},
       {"flange_moved_m", run.largest_drop_m},
       {"recording", flags.output},
+      {"contacts", Json::array()},
+      {"plate", plate_json(run)},
       {"joints", Json::array()}};
+  for (const torsio::ArmContact& contact : run.contacts)
+    document["contacts"].push_back(
+        {{"found_s", contact.found_s},
+         {"joint", contact.joint},
+         {"reaction", torsio::name(contact.reaction)},
+         {"latency_s", contact.latency_s ? Json(*contact.latency_s) : Json(nullptr)}});
   for (const torsio::ArmJointScore& score : run.scores)
     document["joints"].push_back(
         {{"joint", score.joint},
@@ -175,11 +210,12 @@ void write_joints(const ArmFlags& flags, const torsio::ArmRun& run,
 void run(const ArmFlags& flags) {
   DataFlags().check_outputs(
       {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
-      {flags.arm == kReadyArm ? std::string() : flags.arm, flags.program});
+      {flags.source.arm == ArmSource::kReady ? std::string() : flags.source.arm, flags.program,
+       flags.contacts});
   ProgressBar progress;
-  const torsio::ArmSetup setup = setup_of(flags, progress.listener());
+  const torsio::ArmSetup setup = flags.source.setup(progress.listener());
   if (flags.is_described) return print(description(setup));
-  if (flags.program.empty() && flags.arm != kReadyArm)
+  if (flags.program.empty() && flags.source.arm != ArmSource::kReady)
     throw torsio::UsageError(
         {.place = "torsio arm",
          .expected = "--program FILE.yaml, what your arm does",
@@ -190,6 +226,7 @@ void run(const ArmFlags& flags) {
                      ? torsio::arm6_program()
                      : torsio::read_arm_program(flags.program, setup, progress.listener()),
       .faults = faults_of(flags, setup),
+      .contacts = contacts_of(flags, setup),
       .seed = flags.seed,
       .has_gear_stage = !flags.has_rigid_gears,
       .with_truth = flags.with_truth};
@@ -201,7 +238,8 @@ void run(const ArmFlags& flags) {
                        done.record.sample_rate_Hz()));
   }
   if (!flags.folder.empty()) write_joints(flags, done, progress.listener());
-  if (flags.json.wants_tables()) print(score_text(done) + stop_text(done) + "\n");
+  if (flags.json.wants_tables())
+    print(score_text(done) + contact_text(done) + stop_text(done) + "\n");
   flags.json.write(torsio::json_text(run_json(flags, done)));
   if (flags.report.is_wanted())
     flags.report.write(torsio::arm_report(setup, done, {stop_text(done)}));
@@ -219,11 +257,7 @@ void add_arm(CLI::App& app) {
       "         torsio arm --fault joint2:joint_angle=nan@9s\n"
       "         torsio arm identify arm.csv\n"
       "docs/robot/arm.md has the format of arms and programs.");
-  verb->add_option(
-          "ARM", flags->arm,
-          "arm6, the arm of six joints of paper 000, or your own: FILE.yaml, which names a "
-          "URDF file and the actuator of each joint")
-      ->capture_default_str();
+  flags->source.add(*verb);
   verb->add_option("--program", flags->program,
                    "FILE.yaml with moves, holds, hand guiding, impedances and pushes (default for "
                    "arm6: some of each)");
@@ -238,8 +272,9 @@ void add_arm(CLI::App& app) {
   verb->add_option("--fault", flags->faults,
                    "JOINT:WHAT=AMOUNT@TIME, a fault of a sensor or part of one joint: "
                    "joint2:gear_angle=freeze@3s; may be repeated");
-  verb->add_option("--payload", flags->payload, "mass in place of that of the arm's file: 3kg");
-  verb->add_option("--tilt", flags->tilt, "tilt of the base about its y axis: 30deg");
+  verb->add_option("--contacts", flags->contacts,
+                   "FILE.json of torsio arm learn-contacts: contacts are looked for, and the "
+                   "program's reaction takes place");
   add_seed(*verb, flags->seed, "seed of the sensors' noise");
   verb->add_flag(
       "--rigid-gears", flags->has_rigid_gears,
@@ -251,6 +286,7 @@ void add_arm(CLI::App& app) {
                    "write the result as JSON to a file, or - for standard output");
   flags->report.add(*verb);
   add_arm_identify(*verb);
+  add_learn_contacts(*verb);
   verb->callback([flags, verb] {
     if (verb->get_subcommands().empty()) run(*flags);
   });

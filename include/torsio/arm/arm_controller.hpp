@@ -10,6 +10,8 @@
 
 #include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/arm/cartesian_impedance.hpp"
+#include "torsio/arm/contact_detector.hpp"
+#include "torsio/arm/contact_reaction.hpp"
 #include "torsio/arm/momentum_observer.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_stop.hpp"
@@ -48,12 +50,13 @@ enum class ArmStopCause : std::uint8_t {
   measurement,  ///< a joint's sample was not finite for too many ticks
   monitor,      ///< the monitor of a joint, or it was not ready in time
   overload,     ///< the external torque of a joint exceeded its limit for too long
+  contact,      ///< a contact was found, and the reaction is a stop
 };
 
 /// The controllers of an arm of series-elastic joints in one step:
 ///
 ///     angles, currents -> torque of each spring with error bar (`TorqueEstimator` or `MonitoredTorque`)
-///                      -> external torque (`MomentumObserver`)
+///                      -> external torque (`MomentumObserver`) -> contact (`ContactDetector`)
 ///     reference        -> torque that the links need, from the arm's dynamics -> `JointStop` -> `JointController`
 ///                      -> current, power and brake of each joint
 ///
@@ -76,6 +79,9 @@ enum class ArmStopCause : std::uint8_t {
 ///
 /// After `release` the arm holds until all joints run and every monitor watches: with closed brakes the torque of a
 /// motor's current differs from that of the spring, so that the monitors are proven after the brakes are open.
+///
+/// After a contact in the position mode (also while the arm holds) the reaction replaces the reference until `end_reaction`;
+/// in the other modes, which yield to a hand, contacts are only reported. A fault during a reaction stops the arm as any other.
 ///
 /// Paper 000 section 6.4 has the arm; the control of the whole arm is ours.
 class ArmController {
@@ -116,6 +122,9 @@ class ArmController {
         3;  ///< ticks in a row in which a joint's sample may be missing
     double longest_overload_s = 0.02;
     double longest_proof_s = 1.0;  ///< until the monitors watch, from when all joints run
+    std::optional<ContactDetector::Settings> contacts = {};  ///< none: contacts are not looked for
+    ContactReaction reaction = ContactReaction::none;
+    ReactionMotion::Settings reaction_motion = {};
     StopCategory stop_category =
         StopCategory::ramp_and_brake;  ///< category of a stop after a fault
   };
@@ -128,10 +137,19 @@ class ArmController {
     double link_Nm = 0.0;      ///< the same less the friction of the bearing: what moves the link
     double wanted_Nm = 0.0;    ///< torque that the links need, friction included
     double external_Nm = 0.0;  ///< external torque, of the observer
-    double speed_rad_s = 0.0;  ///< measured, of the link
+    double external_std_Nm = kNotMeasured;  ///< its standard deviation, if contacts are looked for
+    double speed_rad_s = 0.0;               ///< measured, of the link
     JointStop::Phase phase = JointStop::Phase::running;
     JointCascade::Limit limit = JointCascade::Limit::none;
     Fault fault = Fault::none;
+  };
+  /// The last contact.
+  struct Contact {
+    /// A threshold is exceeded, or was within 0.2 s; with a reaction until `end_reaction` or `release`.
+    bool is_found = false;
+    std::size_t joint = 0;         ///< in which it was found
+    double time_s = kNotMeasured;  ///< `JointSample::t_s` of that joint when it was found
+    ContactReaction reaction = ContactReaction::none;  ///< that is in effect, or stopped the arm
   };
   struct Output {
     std::array<JointOutput, kMaxArmJoints> joints = {};
@@ -143,6 +161,7 @@ class ArmController {
         false;                    ///< not finite, or a mode that is not configured: the arm holds
     double manipulability = 1.0;  ///< cartesian
     bool is_singular = false;     ///< cartesian
+    Contact contact = {};
   };
 
   /// @throws Error as the parts, if the numbers of joints differ, or a setting is out of range; the message names the
@@ -157,6 +176,12 @@ class ArmController {
   void stop(StopCategory category) noexcept TORSIO_REALTIME;
   /// Ends a stop when all joints are at rest. @returns false, and nothing changes, if one is not
   [[nodiscard]] bool release() noexcept TORSIO_REALTIME;
+
+  void set_reaction(ContactReaction reaction) noexcept TORSIO_REALTIME {
+    settings_.reaction = reaction;
+  }
+  /// Ends hold, retract or float: from the next step on the arm follows its reference again, from where it is.
+  void end_reaction() noexcept TORSIO_REALTIME;
 
   /// @param samples one per joint
   /// @returns valid until the next call
@@ -190,6 +215,7 @@ class ArmController {
     Differentiator motor_speed;
     Drive drive;
     double stiffness_Nm_rad;
+    double speed_limit_rad_s;
     double bearing_Nm;
     double viscous_Nms_rad;
     double largest_external_Nm;
@@ -208,6 +234,9 @@ class ArmController {
   void supervise(std::span<const JointSample> samples) noexcept;
   void find(ArmStopCause cause, std::size_t joint) noexcept;
   void prove() noexcept;
+  void find_contact(const ArmReference& reference, std::span<const JointSample> samples) noexcept;
+  void react(const ArmReference& reference) noexcept;
+  const ArmReference& reaction_reference() noexcept;
   [[nodiscard]] bool is_usable(const ArmReference& reference) const noexcept;
   [[nodiscard]] bool is_near(const ArmReference& reference) const noexcept;
   void hold() noexcept;
@@ -223,6 +252,8 @@ class ArmController {
   ArmDynamics dynamics_;
   MomentumObserver observer_;
   std::optional<CartesianImpedance> cartesian_;
+  std::optional<ContactDetector> contacts_;
+  ReactionMotion reaction_;
   std::vector<Axis> joints_;
   ArmDynamics::PerJoint angle_rad_ = {};
   ArmDynamics::PerJoint speed_rad_s_ = {};
@@ -231,6 +262,9 @@ class ArmController {
   ArmReference holding_ =
       {};                 ///< where the arm was at the first step, or when a reference was refused
   double proof_s_ = 0.0;  ///< since all joints run
+  ArmReference reacting_ = {};  ///< the reference that a reaction makes
+  bool is_reacting_ = false;
+  double no_contact_s_ = 0.0;  ///< since a threshold was exceeded
   bool is_started_ = false;
   bool is_holding_ = false;
   bool is_guided_ = false;  ///< in the last tick

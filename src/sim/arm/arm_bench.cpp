@@ -44,6 +44,17 @@ ArmBench::ArmBench(const ArmSetup& setup, FirstStageForm form,
   }
 }
 
+Vector3 ArmBench::flange_m() const {
+  ArmDynamics::PerJoint angle_rad = {};
+  for (std::size_t j = 0; j < plant_.size(); ++j) angle_rad[j] = plant_.state(j).joint_angle_rad;
+  return plant_.dynamics().flange(angle_rad).position_m;
+}
+
+void ArmBench::use(ArmPlate plate) {
+  if (plate.is_from_flange) plate.at_m = plate.at_m + flange_m();
+  plant_.use(plate);
+}
+
 SensedPlant ArmBench::sensed(std::size_t joint) const noexcept {
   const PlantState& state = plant_.state(joint);
   return {.state = state,

@@ -44,6 +44,14 @@ class ArmBench {
   void act(std::span<const Command> commands, const ArmLoad& load);
 
   [[nodiscard]] const ArmPlant& plant() const noexcept { return plant_; }
+  /// From now on there is this plate.
+  /// @param plate measured from the flange where it truly is, or in the frame of the base
+  void use(ArmPlate plate);
+  [[nodiscard]] Vector3 flange_m() const;  ///< where the flange truly is
+  /// @returns the largest force of the plate since the last call [N]; 0 without one
+  double take_largest_plate_N() noexcept {
+    return plant_.plate() == nullptr ? 0.0 : plant_.plate()->take_largest_N();
+  }
   [[nodiscard]] double time_s() const noexcept {
     return static_cast<double>(tick_ - start_tick_) / kBenchRate_Hz;
   }

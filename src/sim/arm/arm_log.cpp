@@ -32,8 +32,8 @@ double root_mean(double squares, std::size_t count) {
 
 }  // namespace
 
-ArmLog::ArmLog(const ArmSetup& setup, bool with_truth)
-    : name_(setup.arm.name), with_truth_(with_truth) {
+ArmLog::ArmLog(const ArmSetup& setup, bool with_truth, bool has_plate)
+    : name_(setup.arm.name), with_truth_(with_truth), has_plate_(has_plate) {
   for (std::size_t j = 0; j < setup.joints.size(); ++j) {
     const DataSheet& sheet = setup.joints[j].sheet;
     Joint& joint = joints_.emplace_back(Joint{.channels = sensed_channels(sheet)});
@@ -127,6 +127,7 @@ void ArmLog::finish(ArmRun& run) && {
     score.largest_share = score.largest_torque_Nm / joint.rating_Nm;
     run.scores.push_back(std::move(score));
   }
+  if (has_plate_) run.record.add({.name = "plate_force_N", .values = std::move(plate_N_)});
 }
 
 }  // namespace torsio

@@ -15,7 +15,8 @@ namespace torsio {
 /// What an arm's logger writes down, tick by tick, and the scores of its joints.
 class ArmLog {
  public:
-  ArmLog(const ArmSetup& setup, bool with_truth);
+  /// @param has_plate the force of a plate is recorded
+  ArmLog(const ArmSetup& setup, bool with_truth, bool has_plate);
 
   /// The sensors and the true torques at this tick, before the arm moves on.
   void see(const ArmBench& bench);
@@ -23,6 +24,10 @@ class ArmLog {
   /// @param is_position whether the links are to be at the angles of `wanted`
   void add(const ArmBench& bench, const ArmController::Output& output, const ArmReference& wanted,
            bool is_position);
+  /// The largest force of the plate in the same tick.
+  void add_plate(double force_N) {
+    if (has_plate_) plate_N_.push_back(force_N);
+  }
   [[nodiscard]] std::size_t size() const noexcept { return ticks_; }
   void finish(ArmRun& run) &&;
 
@@ -56,6 +61,8 @@ class ArmLog {
 
   std::string name_;
   bool with_truth_;
+  bool has_plate_;
+  std::vector<double> plate_N_;
   std::vector<Joint> joints_;
   std::size_t ticks_ = 0;
 };

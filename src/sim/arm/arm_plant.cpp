@@ -137,6 +137,22 @@ Fault ArmPlant::set_condition(std::size_t joint, const PlantCondition& condition
   return joints_[joint].drive.set_condition(condition, joints_[joint].stiffest_stop_Nm_rad);
 }
 
+void ArmPlant::use(const std::optional<ArmPlate>& plate) {
+  plate_.reset();
+  if (!plate) return;
+  constexpr auto kPlatePlace = "plate";
+  const double length = std::sqrt(dot(plate->normal, plate->normal));
+  require_parameter(std::abs(length - 1.0) < 1e-6, kPlatePlace, "a normal of length 1", length);
+  require_parameter(
+      plate->stiffness_N_m > 0.0 && plate->stiffness_N_m <= PlateContact::kLargestStiffness_N_m,
+      kPlatePlace, "a stiffness above 0 and at most 1e6 N/m", plate->stiffness_N_m);
+  require_not_negative(kPlatePlace, "the damping", plate->damping_Ns_m);
+  require_parameter(plate->mass_kg == 0.0 || plate->mass_kg >= PlateContact::kSmallestMass_kg,
+                    kPlatePlace, "a mass of 0.5 kg or more, or 0 for a clamped one",
+                    plate->mass_kg);
+  plate_.emplace(*plate);
+}
+
 void ArmPlant::set_period(double dt_s) noexcept {
   asked_dt_s_ = dt_s;
   small_steps_ = small_steps(dt_s, longest_step_s_);
@@ -172,6 +188,21 @@ void ArmPlant::small_step(std::span<const PlantCommand> commands, const ArmLoad&
         load.is_locked[i] ? 0.0 : state.joint_speed_rad_s + dt_s_ * acceleration_rad_s2[i];
     state.joint_angle_rad += dt_s_ * state.joint_speed_rad_s;
   }
+  if (plate_) plate_->move(dt_s_);
+}
+
+void ArmPlant::touch_plate(std::span<const double> angle_rad,
+                           std::span<const double> speed_rad_s) noexcept {
+  ArmDynamics::Jacobian jacobian;
+  const ArmFrame flange = dynamics_.jacobian(angle_rad, jacobian);
+  Vector3 velocity_m_s{};
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t i = 0; i < size(); ++i)
+      velocity_m_s[row] += jacobian[row * size() + i] * speed_rad_s[i];
+  const Vector3 force_N = plate_->find_force(flange.position_m, velocity_m_s) * plate_->normal();
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t i = 0; i < size(); ++i)
+      external_Nm_[i] += jacobian[row * size() + i] * force_N[row];
 }
 
 void ArmPlant::accelerate(const ArmLoad& load,
@@ -185,6 +216,7 @@ void ArmPlant::accelerate(const ArmLoad& load,
     speed_rad_s[i] = joints_[i].state.joint_speed_rad_s;
   }
   find_external(angle_rad, load, external_Nm_);
+  if (plate_) touch_plate(angle_rad, speed_rad_s);
   dynamics_.equation(angle_rad, speed_rad_s, mass_kg_m2, bias_Nm);
   for (std::size_t i = 0; i < size(); ++i)
     acceleration_rad_s2[i] = joints_[i].torques.joint_Nm -

@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "sim/arm/plate_contact.hpp"
 #include "sim/plant/drive_train.hpp"
 #include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/arm/arm_model.hpp"
@@ -24,6 +26,8 @@ struct ArmLoad {
 /// A serial arm whose joints are moved by series-elastic actuators, each a `DriveTrain`:
 ///
 ///     M(q) q̈ = τ_second − τ_bearing − d q̇ + τ_ext + J(q)ᵀ f − c(q, q̇) − g(q)
+///
+/// f also has the force of a plate that the flange touches, in every step of the integration.
 ///
 /// A clamped joint keeps q̇ᵢ = 0; its row and column are left out. The links of the model replace
 /// `PlantParameters::joint_inertia_kg_m2`, which is not used; the masses of the motors are in the
@@ -75,6 +79,11 @@ class ArmPlant {
   void use(std::size_t joint, const Brake::Parameters& brake) {
     joints_[joint].drive.use(brake, longest_step_s_);
   }
+  /// From now on the flange may hit this plate, whose place is in the frame of the base; none: it is removed.
+  /// @throws Error if its normal is not of length 1, or stiffness, damping or mass are not in the range of `PlateContact`.
+  void use(const std::optional<ArmPlate>& plate);
+  [[nodiscard]] PlateContact* plate() noexcept { return plate_ ? &*plate_ : nullptr; }
+  [[nodiscard]] const PlateContact* plate() const noexcept { return plate_ ? &*plate_ : nullptr; }
   void set_brake(std::size_t joint, bool is_closed) noexcept {
     joints_[joint].drive.set_brake(is_closed);
   }
@@ -98,7 +107,7 @@ class ArmPlant {
   [[nodiscard]] const PlantTorques& torques(std::size_t joint) const noexcept {
     return joints_[joint].torques;
   }
-  /// What acted on the joint from outside in the last step, τ_ext + J(q)ᵀ f [Nm].
+  /// What acted on the joint from outside in the last step, τ_ext + J(q)ᵀ f with the plate's force [Nm].
   [[nodiscard]] double external_torque(std::size_t joint) const noexcept {
     return external_Nm_[joint];
   }
@@ -124,11 +133,13 @@ class ArmPlant {
   void accelerate(const ArmLoad& load, ArmDynamics::PerJoint& acceleration_rad_s2) noexcept;
   void find_external(std::span<const double> angle_rad, const ArmLoad& load,
                      ArmDynamics::PerJoint& external_Nm) const noexcept;
+  void touch_plate(std::span<const double> angle_rad, std::span<const double> speed_rad_s) noexcept;
   void rest_at_zero() noexcept;
 
   ArmDynamics dynamics_;
   std::vector<Joint> joints_;
   ArmDynamics::PerJoint external_Nm_{};
+  std::optional<PlateContact> plate_ = {};
   double longest_step_s_;
   double asked_dt_s_ = 0.0;
   double dt_s_ = 0.0;

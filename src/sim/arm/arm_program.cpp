@@ -9,6 +9,7 @@
 
 #include "arm/vector3.hpp"
 #include "data/yaml_reader.hpp"
+#include "sim/arm/plate_contact.hpp"
 #include "sim/sensors/sensor_set.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -101,6 +102,47 @@ ArmPush push_of(const YamlValue& yaml, const ArmSetup& setup) {
   return push;
 }
 
+ArmPlate plate_of(const YamlValue& yaml) {
+  yaml.allow_only({"at", "from_flange", "normal", "stiffness_N_m", "damping_Ns_m", "mass"});
+  const auto at = yaml.find("at");
+  const auto from_flange = yaml.find("from_flange");
+  if (at.has_value() == from_flange.has_value())
+    yaml.refuse("one of at (in the frame of the base) and from_flange (from where the flange is)");
+  ArmPlate plate{.is_from_flange = from_flange.has_value(),
+                 .at_m = vector_of(at ? *at : *from_flange, "m")};
+  const YamlValue normal = yaml.at("normal");
+  const std::vector<YamlValue> items = normal.items();
+  if (items.size() != 3) normal.refuse("three numbers, along x, y and z of the base");
+  for (std::size_t i = 0; i < 3; ++i) plate.normal[i] = items[i].plain_number(1e3);
+  const double length = std::sqrt(dot(plate.normal, plate.normal));
+  if (!(length > 0.0)) normal.refuse("a direction: not three zeros");
+  plate.normal = (1.0 / length) * plate.normal;
+  const YamlValue stiffness = yaml.at("stiffness_N_m");
+  plate.stiffness_N_m = stiffness.plain_number(PlateContact::kLargestStiffness_N_m);
+  if (!(plate.stiffness_N_m > 0.0)) stiffness.refuse("a stiffness above 0 and at most 1e6 N/m");
+  if (const auto damping = yaml.find("damping_Ns_m")) {
+    plate.damping_Ns_m = damping->plain_number(kLargestGain);
+    if (!(plate.damping_Ns_m >= 0.0)) damping->refuse("a damping of 0 or more");
+  }
+  if (const auto mass = yaml.find("mass")) {
+    plate.mass_kg = mass->number("kg");
+    if (!(plate.mass_kg >= PlateContact::kSmallestMass_kg && plate.mass_kg <= kLargestForce_N))
+      mass->refuse("a mass of 0.5 kg or more", "Leave the mass out for a clamped plate.");
+  }
+  return plate;
+}
+
+ContactReaction reaction_of(const YamlValue& yaml) {
+  constexpr std::array kReactions{ContactReaction::none, ContactReaction::stop,
+                                  ContactReaction::hold, ContactReaction::retract,
+                                  ContactReaction::floating};
+  const std::string word = yaml.text();
+  const auto* const found = std::ranges::find_if(
+      kReactions, [&](ContactReaction reaction) { return name(reaction) == word; });
+  if (found == kReactions.end()) yaml.refuse("one of none, stop, hold, retract and float");
+  return *found;
+}
+
 /// The line of a CSV file with a header in which a sample is.
 std::string at_sample(const std::string& file, std::size_t sample) {
   return file.ends_with(".csv") ? fmt::format("{}: line {}", file, sample + 2)
@@ -165,9 +207,9 @@ ArmStep step_of(const YamlValue& yaml, const std::filesystem::path& folder, cons
   step.task = *task;
   const YamlValue what = yaml.at(name(step.task));
   if (step.task == ArmTask::impedance)
-    yaml.allow_only({"impedance", "stiffness_Nm_rad", "damping_Nms_rad", "push"});
+    yaml.allow_only({"impedance", "stiffness_Nm_rad", "damping_Nms_rad", "push", "plate"});
   else
-    yaml.allow_only({name(step.task), "push"});
+    yaml.allow_only({name(step.task), "push", "plate"});
   switch (step.task) {
     case ArmTask::move: step.to_rad = angles_of(what, setup); break;
     case ArmTask::follow:
@@ -185,6 +227,7 @@ ArmStep step_of(const YamlValue& yaml, const std::filesystem::path& folder, cons
     const std::vector<YamlValue> pushes = push->is_list() ? push->items() : std::vector{*push};
     for (const YamlValue& one : pushes) step.pushes.push_back(push_of(one, setup));
   }
+  if (const auto plate = yaml.find("plate")) step.plate = plate_of(*plate);
   return step;
 }
 
@@ -210,10 +253,11 @@ CartesianImpedance::Settings cartesian_of(const YamlValue& yaml) {
 ArmProgram read_arm_program(const std::string& path, const ArmSetup& setup,
                             const Progress& progress) {
   const YamlValue yaml = YamlValue::read(path, progress);
-  yaml.allow_only({"start", "program", "cartesian"});
+  yaml.allow_only({"start", "program", "cartesian", "contact"});
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   ArmProgram program{.start_rad = angles_of(yaml.at("start"), setup)};
   if (const auto cartesian = yaml.find("cartesian")) program.cartesian = cartesian_of(*cartesian);
+  if (const auto contact = yaml.find("contact")) program.reaction = reaction_of(*contact);
   const YamlValue steps = yaml.at("program");
   if (!steps.is_list() || steps.items().empty() || steps.items().size() > kMaxSteps)
     steps.refuse(fmt::format("a list of 1 to {} steps", kMaxSteps));

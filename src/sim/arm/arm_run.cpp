@@ -12,16 +12,17 @@
 
 #include "arm/vector3.hpp"
 #include "core/report_progress.hpp"
-#include "sim/arm/arm_bench.hpp"
 #include "sim/arm/arm_log.hpp"
+#include "sim/arm/arm_session.hpp"
+#include "sim/arm/contact_watch.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kSlowDown_s = 0.2;      // time constant of a hold after a free motion
-constexpr double kLongestStart_s = 5.0;  // until the brakes are open
-constexpr double kLongestStop_s = 5.0;   // from a stop to rest
+constexpr double kSlowDown_s = 0.2;     // time constant of a hold after a free motion
+constexpr double kLongestStop_s = 5.0;  // from a stop to rest
+constexpr double kAfterContact_s = 1.0;
 
 /// The reference of a program, tick by tick.
 class ProgramReference {
@@ -50,10 +51,16 @@ class ProgramReference {
     return reference_;
   }
   [[nodiscard]] const ArmReference& current() const { return reference_; }
-  [[nodiscard]] ArmLoad load() const {
+  /// The plate of a step that begins.
+  [[nodiscard]] const std::optional<ArmPlate>& plate() const {
+    static const std::optional<ArmPlate> kNone;
+    return tick_ == 0 ? program_.steps[step_].plate : kNone;
+  }
+  /// The pushes at this tick of the step, or at a later one.
+  [[nodiscard]] ArmLoad load(std::size_t ticks_later = 0) const {
     ArmLoad load;
     for (const ArmPush& push : program_.steps[step_].pushes) {
-      const double time_s = static_cast<double>(tick_) * kArmTick_s;
+      const double time_s = static_cast<double>(tick_ + ticks_later) * kArmTick_s;
       if (time_s < push.start_s || time_s >= push.start_s + push.duration_s) continue;
       load.force_N = load.force_N + push.force_N;
       load.moment_Nm = load.moment_Nm + push.moment_Nm;
@@ -148,128 +155,129 @@ class ProgramReference {
   ArmReference reference_;
 };
 
-/// Bench and controller, tick by tick.
+bool is_pushing(const ArmLoad& load) {
+  double sum = 0.0;
+  for (const double torque_Nm : load.torque_Nm) sum += std::abs(torque_Nm);
+  for (std::size_t i = 0; i < 3; ++i)
+    sum += std::abs(load.force_N[i]) + std::abs(load.moment_Nm[i]);
+  return sum > 0.0;
+}
+
+ArmController::Settings controller_settings(const ArmSetup& setup, const ArmRunSpec& spec) {
+  ArmController::Settings settings = arm_controller_settings(setup, spec.program.cartesian);
+  settings.contacts = spec.contacts;
+  settings.reaction = spec.program.reaction;
+  return settings;
+}
+
+bool has_plate(const ArmProgram& program) {
+  return std::ranges::any_of(program.steps,
+                             [](const ArmStep& step) { return step.plate.has_value(); });
+}
+
+/// The program on bench and controller, tick by tick.
 class Runner {
  public:
   Runner(const ArmSetup& setup, const ArmRunSpec& spec)
       : setup_(setup),
-        bench_(setup, spec.has_gear_stage ? FirstStageForm::elastic : FirstStageForm::rigid,
-               spec.faults, spec.seed, spec.program.start_rad),
-        controller_(arm_controller_settings(setup, spec.program.cartesian), kBenchRate_Hz),
+        session_(setup, controller_settings(setup, spec),
+                 spec.has_gear_stage ? FirstStageForm::elastic : FirstStageForm::rigid, spec.faults,
+                 spec.seed, spec.program.start_rad),
         reference_(spec.program, setup),
-        log_(setup, spec.with_truth),
-        commands_(setup.joints.size()),
-        angle_rad_(spec.program.start_rad),
-        speed_rad_s_(setup.joints.size(), 0.0) {}
-
-  void open_brakes() {
-    ArmReference hold;
-    std::ranges::copy(angle_rad_, hold.position_rad.begin());
-    bool is_released = false;
-    for (bool is_ready = false; !is_ready;) {
-      const auto& output = tick(hold, {});
-      is_ready = output.is_ready;
-      if (is_released && output.cause != ArmStopCause::none)
-        throw Error(
-            {.place = fmt::format("joint '{}'", setup_.arm.joints[output.joint].name),
-             .problem = "the arm was stopped before it was ready: " + stop_reason(output),
-             .advice = output.cause == ArmStopCause::monitor
-                           ? "Calibrate its monitor with recordings of this joint in this arm."
-                           : ""});
-      if (bench_.time_s() > kLongestStart_s)
-        throw Error(
-            {.place = setup_.arm.name,
-             .problem = fmt::format("the joints did not take over their loads within {:g} s "
-                                    "after the start",
-                                    kLongestStart_s)});
-      if (!is_released) is_released = controller_.release();
-    }
-    bench_.start_clock();
+        log_(setup, spec.with_truth, has_plate(spec.program)) {
+    session_.open_brakes();
   }
 
   ArmRun run(const Progress& progress) {
     ArmRun run{.record = Recording(setup_.arm.name, kBenchRate_Hz)};
-    double stop_s = 0.0;
-    Vector3 stopped_at_m = {};
     while (!reference_.is_done()) {
       if (log_.size() % 1000 == 0)
-        report_progress(progress, 0.0, fmt::format("the arm moves: {:.0f} s", bench_.time_s()));
+        report_progress(progress, 0.0, fmt::format("the arm moves: {:.0f} s", session_.time_s()));
       const bool is_stopping = run.cause != ArmStopCause::none;
-      const ArmReference& wanted =
-          is_stopping ? reference_.current()
-                      : reference_.next(angle_rad_, speed_rad_s_, controller_.dynamics());
-      const ArmLoad load = is_stopping ? ArmLoad{} : reference_.load();
-      const auto& output = tick(wanted, load);
-      log_.add(bench_, output, wanted, !is_stopping && reference_.is_position());
-      if (!is_stopping) {
-        reference_.advance();
-        if (output.cause == ArmStopCause::none) continue;
+      const ArmController::Output& output = tick(run, is_stopping || is_reacting());
+      if (is_reacting()) {
+        ++since_contact_;
+        if (static_cast<double>(since_contact_) * kArmTick_s > kAfterContact_s &&
+            (!is_stopping || has_ended(run, output)))
+          break;
+      }
+      if (is_stopping) {
+        if (has_ended(run, output)) break;
+      } else if (output.cause != ArmStopCause::none) {
         run.cause = output.cause;
         run.stopped_joint = setup_.arm.joints[output.joint].name;
-        run.stop_reason = stop_reason(output);
-        run.stopped_s = stop_s = bench_.time_s();
-        stopped_at_m = controller_.dynamics().flange(angle_rad_).position_m;
-        continue;
+        run.stop_reason = session_.stop_reason(output);
+        run.stopped_s = session_.time_s();
+        stopped_at_m_ = session_.controller().dynamics().flange(session_.angle_rad()).position_m;
       }
-      const Vector3 moved = true_flange() - stopped_at_m;
-      run.largest_drop_m = std::max(run.largest_drop_m, std::sqrt(dot(moved, moved)));
-      if (output.is_at_rest) {
-        run.at_rest_s = bench_.time_s() - stop_s;
-        break;
-      }
-      if (bench_.time_s() - stop_s > kLongestStop_s) break;
     }
-    run.duration_s = bench_.time_s();
+    run.duration_s = session_.time_s();
+    std::move(watch_).finish(run);
     std::move(log_).finish(run);
     return run;
   }
 
  private:
-  [[nodiscard]] Vector3 true_flange() const {
-    std::vector<double> angle_rad;
-    for (std::size_t j = 0; j < setup_.joints.size(); ++j)
-      angle_rad.push_back(bench_.plant().state(j).joint_angle_rad);
-    return controller_.dynamics().flange(angle_rad).position_m;
-  }
-  [[nodiscard]] std::string stop_reason(const ArmController::Output& output) const {
-    if (output.cause != ArmStopCause::monitor) return std::string(name(output.cause));
-    const Monitor& monitor = controller_.monitored(output.joint)->monitor();
-    if (monitor.state() != Monitor::State::stopped)
-      return "its monitor is not ready; while the arm holds, its sources differ or are not settled";
-    return describe(monitor.reason(), monitor.settings());
-  }
-  const ArmController::Output& tick(const ArmReference& wanted, const ArmLoad& load) {
-    bench_.sense();
-    for (std::size_t j = 0; j < angle_rad_.size(); ++j)
-      if (std::isfinite(bench_.samples()[j].joint_angle_rad))
-        angle_rad_[j] = bench_.samples()[j].joint_angle_rad;
-    const auto& output = controller_.step(wanted, bench_.samples());
-    for (std::size_t j = 0; j < commands_.size(); ++j) {
-      const ArmController::JointOutput& joint = output.joints[j];
-      commands_[j] = {joint.current_A, joint.is_powered, joint.is_brake_open};
-      speed_rad_s_[j] = joint.speed_rad_s;
-    }
-    log_.see(bench_);
-    bench_.act(commands_, load);
+  [[nodiscard]] bool is_reacting() const { return has_reacted_; }
+
+  /// Control, log and motion. @param is_over the program does not continue
+  const ArmController::Output& tick(const ArmRun& run, bool is_over) {
+    ArmBench& bench = session_.bench();
+    const ArmController& controller = session_.controller();
+    if (!is_over && reference_.plate()) bench.use(*reference_.plate());
+    const ArmReference& wanted =
+        is_over
+            ? reference_.current()
+            : reference_.next(session_.angle_rad(), session_.speed_rad_s(), controller.dynamics());
+    const ArmLoad load = has_reacted_                      ? reference_.load(since_contact_)
+                         : run.cause != ArmStopCause::none ? ArmLoad{}
+                                                           : reference_.load();
+    const ArmController::Output& output = session_.control(wanted);
+    watch_.see(output, setup_.arm, session_.time_s(), is_pushing(load));
+    log_.see(bench);
+    session_.act(load);
+    log_.add(bench, output, wanted, !is_over && reference_.is_position());
+    const double plate_N = bench.take_largest_plate_N();
+    log_.add_plate(plate_N);
+    watch_.measure(plate_N, session_.time_s());
+    if (!is_over) reference_.advance();
+    has_reacted_ = has_reacted_ || output.contact.reaction != ContactReaction::none;
     return output;
+  }
+  /// Whether a stopped arm is at rest, or has had its time.
+  bool has_ended(ArmRun& run, const ArmController::Output& output) {
+    const Vector3 moved = session_.bench().flange_m() - stopped_at_m_;
+    run.largest_drop_m = std::max(run.largest_drop_m, std::sqrt(dot(moved, moved)));
+    const double since_s = session_.time_s() - run.stopped_s;
+    if (output.is_at_rest && !run.at_rest_s) run.at_rest_s = since_s;
+    const bool is_watched =
+        has_reacted_ && static_cast<double>(since_contact_) * kArmTick_s <= kAfterContact_s;
+    return (output.is_at_rest && !is_watched) || since_s > kLongestStop_s;
   }
 
   const ArmSetup& setup_;
-  ArmBench bench_;
-  ArmController controller_;
+  ArmSession session_;
   ProgramReference reference_;
   ArmLog log_;
-  std::vector<ArmBench::Command> commands_;
-  std::vector<double> angle_rad_;
-  std::vector<double> speed_rad_s_;
+  ContactWatch watch_;
+  Vector3 stopped_at_m_ = {};
+  std::size_t since_contact_ = 0;  ///< ticks since a reaction began
+  bool has_reacted_ = false;
 };
 
 }  // namespace
 
 ArmRun run_arm(const ArmSetup& setup, const ArmRunSpec& spec, const Progress& progress) {
   require_possible(spec.program, setup);
+  if (spec.program.reaction != ContactReaction::none && !spec.contacts)
+    throw UsageError({.place = setup.arm.name,
+                      .problem = fmt::format("the program reacts to contacts ('{}'), but none are "
+                                             "looked for",
+                                             name(spec.program.reaction)),
+                      .expected = "thresholds of contacts (--contacts FILE)",
+                      .found = "none",
+                      .advice = "Learn them with torsio arm learn-contacts."});
   Runner runner(setup, spec);
-  runner.open_brakes();
   return runner.run(progress);
 }
 

@@ -9,6 +9,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
+#include "torsio/sim/arm/arm_plate.hpp"
 #include "torsio/sim/arm/arm_setup.hpp"
 #include "torsio/sim/faults/fault_schedule.hpp"
 
@@ -41,12 +42,15 @@ struct ArmStep {
   std::vector<double> stiffness_Nm_rad = {};       ///< impedance: one per joint
   std::vector<double> damping_Nms_rad = {};        ///< impedance: one per joint
   std::vector<ArmPush> pushes = {};
+  /// From the beginning of the step to the end of the program, or to the next one.
+  std::optional<ArmPlate> plate = {};
 };
 
 /// Plain data: what an arm does, one step after the other.
 struct ArmProgram {
   std::vector<double> start_rad;
   std::vector<ArmStep> steps = {};
+  ContactReaction reaction = ContactReaction::none;
   CartesianImpedance::Settings cartesian = {.stiffness = {800.0, 800.0, 800.0, 40.0, 40.0, 40.0}};
 };
 
@@ -63,6 +67,9 @@ struct ArmProgram {
 ///         damping_Nms_rad: [30, 30, 12, 2, 2, 1]
 ///       - cartesian: 3s
 ///       - follow: trajectory.csv
+///       - move: [30deg, -40deg, 80deg, 20deg, 50deg, 0deg]
+///         plate: {from_flange: [50mm, 0mm, 0mm], normal: [-1, 0, 0], stiffness_N_m: 75000, mass: 4.4kg}
+///     contact: retract
 ///
 /// `follow` takes channels `joint1_angle_rad`, ..., named as the joints of the arm.
 /// @throws Error naming file, line, what was expected and found: an angle beyond the limits, a trajectory that is not
@@ -73,12 +80,13 @@ struct ArmProgram {
 /// Moves through a few poses, hand guiding and a push against the flange: for `arm6_setup`.
 [[nodiscard]] ArmProgram arm6_program();
 
-/// @throws Error as `read_arm_program`, that names the step.
+/// @throws Error as `read_arm_program`, that names the step. A plate is refused as by `ArmPlant`.
 void require_possible(const ArmProgram& program, const ArmSetup& setup);
 
 struct ArmRunSpec {
   ArmProgram program;
-  std::vector<FaultSchedule> faults = {};  ///< one per joint; empty: none
+  std::vector<FaultSchedule> faults = {};                  ///< one per joint; empty: none
+  std::optional<ContactDetector::Settings> contacts = {};  ///< none: contacts are not looked for
   std::uint64_t seed = 1;
   bool has_gear_stage = true;  ///< else rotor and gear output turn together: half the cost
   bool with_truth = false;     ///< also what no sensor measures
@@ -97,6 +105,25 @@ struct ArmJointScore {
   double limited_s = 0.0;      ///< how long a limit was in effect
 };
 
+/// A contact that the arm's controller found.
+struct ArmContact {
+  double found_s = 0.0;
+  std::string joint = {};
+  ContactReaction reaction = ContactReaction::none;
+  std::optional<double> latency_s =
+      {};  ///< since it truly began; none: there was none, a false alarm
+};
+
+/// The force between flange and plate.
+struct ArmImpact {
+  double touched_s = 0.0;     ///< when
+  double first_peak_N = 0.0;  ///< largest in the first 40 ms
+  double peak_N = 0.0;
+  double peak_after_s = 0.0;
+  std::optional<double> largest_late_N = {};  ///< largest later than 80 ms after the touch
+  std::optional<double> rest_N = {};          ///< 0.5 s after the touch
+};
+
 /// What an arm did.
 struct ArmRun {
   Recording record;                    ///< all joints on one clock: joint1_motor_angle_rad, ...
@@ -109,13 +136,15 @@ struct ArmRun {
   double stopped_s = 0.0;                ///< when; 0: not stopped
   std::optional<double> at_rest_s = {};  ///< from the stop until all drives were at rest
   double largest_drop_m = 0.0;           ///< how far the flange moved after the stop
+  std::vector<ArmContact> contacts = {};
+  std::optional<ArmImpact> impact = {};  ///< none: the flange touched no plate
 
   /// @returns the name that a channel of a joint has in `record`
   [[nodiscard]] std::string joint_channel(std::size_t joint, std::string_view channel) const;
 };
 
 /// Runs the program on the simulated arm with its sensors: the brakes are opened first, and a fault ends the run with a
-/// stop. @throws Error if a part refuses its settings, UsageError as `FaultInjector`, Cancelled.
+/// stop. A reaction to a contact ends the program; the run continues for one second. @throws Error if a part refuses its settings, UsageError as `FaultInjector`, Cancelled.
 [[nodiscard]] ArmRun run_arm(const ArmSetup& setup, const ArmRunSpec& spec,
                              const Progress& progress = {});
 

@@ -1,0 +1,93 @@
+#include "arm_springs.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <string>
+#include <utility>
+
+#include "core/report_progress.hpp"
+#include "sim/experiments/torque_references.hpp"
+#include "sim/sensors/sensor_set.hpp"
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/control/model_inverse.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/train_model.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kSweep_s = 60.0;
+constexpr double kChirp_s = 60.0;
+constexpr double kNoise_s = 60.0;
+constexpr std::size_t kSerials = 99;
+constexpr double kLightLoad = 0.1;  // shares of the rated torque
+constexpr double kHeavyLoad = 0.5;
+
+Dataset bench_recordings(const std::string& actuator, std::uint64_t seed) {
+  const DataSheet sheet = data_sheet(actuator);
+  const std::array specs{
+      ExperimentSpec{
+          .experiment = "sweep", .duration_s = kSweep_s, .lever_m = lever_m(sheet, kLightLoad)},
+      ExperimentSpec{
+          .experiment = "sweep", .duration_s = kSweep_s, .lever_m = lever_m(sheet, kHeavyLoad)},
+      ExperimentSpec{.experiment = "chirp", .duration_s = kChirp_s},
+      ExperimentSpec{.experiment = "random-walk", .duration_s = kNoise_s}};
+  Dataset dataset;
+  for (std::size_t k = 0; k < specs.size(); ++k) {
+    ExperimentSpec spec = specs[k];
+    spec.actuator = actuator;
+    spec.seed = seed + k;
+    Recording recording = simulate(spec);
+    const std::size_t samples = recording.size();
+    dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
+  }
+  return dataset;
+}
+
+}  // namespace
+
+ArmSetup arm_of_specimens(std::size_t arm, double payload_kg) {
+  ArmSetup setup = arm6_setup();
+  BodyInertia& payload = setup.arm.payload;
+  const double scale = payload_kg / payload.mass_kg;
+  payload.mass_kg = payload_kg;
+  for (double& moment : payload.inertia_kg_m2) moment *= scale;
+  const std::size_t count = setup.joints.size();
+  for (std::size_t j = 0; j < count; ++j) {
+    DataSheet& sheet = setup.joints[j].sheet;
+    sheet = data_sheet(fmt::format("{}#{:02}", sheet.name, 1 + (arm * count + j) % kSerials));
+  }
+  return setup;
+}
+
+std::vector<ModelFile> bench_models(const ArmSetup& setup, std::string_view family,
+                                    std::uint64_t seed, const Progress& progress) {
+  std::vector<ModelFile> models;
+  models.reserve(setup.joints.size());
+  for (std::size_t j = 0; j < setup.joints.size(); ++j) {
+    report_progress(progress, 0.0, fmt::format("the spring of joint {}", j + 1));
+    const Dataset dataset = bench_recordings(full_name(setup.joints[j].sheet), seed + 10 * j);
+    models.push_back(
+        train_model(dataset,
+                    {.family = std::string(family), .features = resolve_inputs(dataset, {})}, seed)
+            .file);
+  }
+  return models;
+}
+
+ArmController::Settings settings_with(const ArmSetup& setup, const std::vector<ModelFile>& models) {
+  ArmController::Settings settings = arm_controller_settings(setup);
+  for (std::size_t j = 0; j < settings.joints.size(); ++j) {
+    ArmController::Joint& joint = settings.joints[j];
+    joint.estimator.emplace(make_estimator(models[j], kBenchRate_Hz));
+    joint.inverse = AnyInverse::of(models[j].settings, models[j].parameters);
+    // The load cell of a bench is after the bearing.
+    joint.bearing_Nm = joint.viscous_Nms_rad = 0.0;
+  }
+  return settings;
+}
+
+}  // namespace torsio
