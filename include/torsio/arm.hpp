@@ -2,13 +2,11 @@
 
 // Start here for an arm of elastic joints. Everything but its construction is real-time code.
 //
-//   ArmModel        links, joints and payload of a serial arm; `read_urdf` makes it from the text of a URDF file
-//   ArmDynamics     torques of a motion, mass matrix, accelerations, Jacobian and place of the flange
-//   ArmMove         moves of all joints together within limits of speed, acceleration and jerk
-//   ArmController   angles and currents of all joints -> currents: positions, impedances, hand guiding, stops
+//   ArmModel          links, joints and payload of a serial arm; `read_urdf` makes it from the text of a URDF file
+//   ArmDynamics       torques of a motion, mass matrix, accelerations, Jacobian and place of the flange
+//   ArmController     angles and currents of all joints -> currents: positions, impedances, hand guiding, stops
 //   MomentumObserver  the external torque at each joint
 //   ContactDetector   contacts, by an external torque above its error bar; `read_contacts` reads what was learned
-//   flange_wrench     force and moment on the flange that make the external torques
 
 #include "torsio/arm/arm_controller.hpp"
 #include "torsio/arm/arm_dynamics.hpp"
