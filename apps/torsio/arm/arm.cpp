@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -77,20 +79,33 @@ std::string description(const torsio::ArmSetup& setup) {
   for (std::size_t j = 0; j < setup.joints.size(); ++j) {
     const torsio::ArmJoint& joint = setup.arm.joints[j];
     const torsio::ArmJointSetup& of = setup.joints[j];
-    table.row({joint.name, torsio::full_name(of.sheet), of.model.empty() ? "linear" : of.model,
+    table.row({joint.name, torsio::full_name(of.sheet),
+               (of.model.empty() ? "linear" : of.model) +
+                   (of.monitor.empty() ? std::string() : ", " + of.monitor),
                fmt::format("{:.0f} to {:.0f}", torsio::deg_from_rad(joint.lowest_rad),
                            torsio::deg_from_rad(joint.highest_rad)),
                fmt::format("{:.0f}", torsio::deg_from_rad(joint.speed_rad_s)),
                fmt::format("{:.1f}", weight_Nm[j]),
                fmt::format("{:.0f}", 100.0 * weight_Nm[j] / of.sheet.rating.torque_Nm.value)});
   }
+  const torsio::Vector3& gravity = setup.arm.gravity_m_s2;
+  const double tilt_deg =
+      torsio::deg_from_rad(std::atan2(std::hypot(gravity[0], gravity[1]), -gravity[2]));
   return fmt::format(
-      "{}: {} joints, a payload of {:.3g} kg\n{}weight: the largest torque of gravity in any "
+      "{}: {} joints, a payload of {:.3g} kg{}\n{}weight: the largest torque of gravity in any "
       "pose\n",
-      setup.arm.name, setup.joints.size(), setup.arm.payload.mass_kg, table.text());
+      setup.arm.name, setup.joints.size(), setup.arm.payload.mass_kg,
+      tilt_deg > 0.0 ? fmt::format(", the base tilted by {:.4g} deg", tilt_deg) : std::string(),
+      table.text());
 }
 
 std::string stop_text(const torsio::ArmRun& run) {
+  if (run.cause == torsio::ArmStopCause::none && run.refused_s > 0.0)
+    return fmt::format(
+        "The program ended, but was not carried out: from {:.3f} s on its reference was refused "
+        "for "
+        "{:.2f} s, since it began too far from the measured angles, and the arm held.",
+        run.refused_from_s, run.refused_s);
   if (run.cause == torsio::ArmStopCause::none) return "The program was carried out to its end.";
   const std::string cause(torsio::name(run.cause));
   return fmt::format(
@@ -164,6 +179,7 @@ Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
       {"stopped_s", run.cause == torsio::ArmStopCause::none ? Json(nullptr) : Json(run.stopped_s)},
       {"at_rest_after_s", run.at_rest_s ? Json(*run.at_rest_s) : Json(nullptr)},
       {"flange_moved_m", run.largest_drop_m},
+      {"reference_refused_s", run.refused_s},
       {"recording", flags.output},
       {"contacts", Json::array()},
       {"plate", plate_json(run)},
@@ -188,6 +204,42 @@ Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
   return document;
 }
 
+/// What the result does not show by itself.
+void remark_on(const torsio::ArmRun& run, const torsio::ArmSetup& setup,
+               std::span<const torsio::FaultSchedule> faults) {
+  for (const torsio::ArmJointScore& score : run.scores)
+    if (score.largest_share > 1.0)
+      remark(
+          fmt::format("warning: {} reached {:.0f} % of its rating; an actuator of this size cannot "
+                      "do this for long",
+                      score.joint, 100.0 * score.largest_share));
+  if (run.cause != torsio::ArmStopCause::none) return;
+  for (std::size_t j = 0; j < faults.size(); ++j)
+    for (const torsio::ScheduledFault& fault : faults[j].faults)
+      if (fault.start_s >= run.duration_s)
+        remark(
+            fmt::format("warning: the fault of {} at {:g} s is after the end of the program at "
+                        "{:.3f} s",
+                        setup.arm.joints[j].name, fault.start_s, run.duration_s));
+}
+
+std::string joint_file(const std::string& folder, std::size_t joint) {
+  return (std::filesystem::path(folder) / fmt::format("joint{}.csv", joint + 1)).string();
+}
+
+/// No output replaces a file that the arm or the program names.
+void check_all_outputs(const ArmFlags& flags, const torsio::ArmSetup& setup,
+                       const torsio::ArmProgram& program) {
+  std::vector<std::string> inputs = setup.files;
+  inputs.insert(inputs.end(), program.files.begin(), program.files.end());
+  std::vector<std::string> outputs = {flags.output, flags.json.destination,
+                                      flags.report.destination, flags.report.plot};
+  if (!flags.folder.empty())
+    for (std::size_t j = 0; j < setup.joints.size(); ++j)
+      outputs.push_back(joint_file(flags.folder, j));
+  DataFlags().check_outputs(outputs, inputs);
+}
+
 void make_folder(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -199,9 +251,7 @@ void make_folder(const std::string& folder) {
 void write_joints(const ArmFlags& flags, const torsio::ArmRun& run,
                   const torsio::Progress& progress) {
   for (std::size_t j = 0; j < run.joints.size(); ++j) {
-    const std::string path =
-        (std::filesystem::path(flags.folder) / fmt::format("joint{}.csv", j + 1)).string();
-    torsio::write_recording(run.joints[j], path, progress);
+    torsio::write_recording(run.joints[j], joint_file(flags.folder, j), progress);
   }
   remark(fmt::format("{}: joint1.csv to joint{}.csv, for check, fit and evaluate", flags.folder,
                      run.joints.size()));
@@ -214,7 +264,10 @@ void run(const ArmFlags& flags) {
        flags.contacts});
   ProgressBar progress;
   const torsio::ArmSetup setup = flags.source.setup(progress.listener());
-  if (flags.is_described) return print(description(setup));
+  if (flags.is_described) {
+    static_cast<void>(torsio::arm_controller_settings(setup));  // opens the models and monitors
+    return print(description(setup));
+  }
   if (flags.program.empty() && flags.source.arm != ArmSource::kReady)
     throw torsio::UsageError(
         {.place = "torsio arm",
@@ -230,8 +283,10 @@ void run(const ArmFlags& flags) {
       .seed = flags.seed,
       .has_gear_stage = !flags.has_rigid_gears,
       .with_truth = flags.with_truth};
+  check_all_outputs(flags, setup, spec.program);
   if (!flags.folder.empty()) make_folder(flags.folder);
   const torsio::ArmRun done = torsio::run_arm(setup, spec, progress.listener());
+  remark_on(done, setup, spec.faults);
   if (!flags.output.empty()) {
     torsio::write_recording(done.record, flags.output, progress.listener());
     remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, done.record.size(),
@@ -287,6 +342,15 @@ void add_arm(CLI::App& app) {
   flags->report.add(*verb);
   add_arm_identify(*verb);
   add_learn_contacts(*verb);
+  for (CLI::App* part : verb->get_subcommands({}))
+    part->preparse_callback([verb, part](std::size_t) {
+      if (verb->get_option("ARM")->count() == 0) return;
+      throw torsio::UsageError(
+          {.place = "torsio arm " + part->get_name(),
+           .expected = "nothing between the two words",
+           .found = "'" + verb->get_option("ARM")->results().front() + "'",
+           .advice = "The arm follows them: torsio arm " + part->get_name() + " --help."});
+    });
   verb->callback([flags, verb] {
     if (verb->get_subcommands().empty()) run(*flags);
   });

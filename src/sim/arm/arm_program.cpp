@@ -9,6 +9,7 @@
 
 #include "arm/vector3.hpp"
 #include "data/yaml_reader.hpp"
+#include "sim/arm/arm_bench.hpp"
 #include "sim/arm/plate_contact.hpp"
 #include "sim/sensors/sensor_set.hpp"
 #include "torsio/core/error.hpp"
@@ -99,6 +100,8 @@ ArmPush push_of(const YamlValue& yaml, const ArmSetup& setup) {
     if (!(push.start_s >= 0.0)) at->refuse("a time of 0 s or more since the step began");
   }
   push.duration_s = duration_of(yaml.at("for"));
+  if (!yaml.find("force") && !yaml.find("moment") && !yaml.find("torque"))
+    yaml.refuse("a force, a moment or a torque", "For example force: [0N, 20N, 0N].");
   return push;
 }
 
@@ -225,7 +228,13 @@ ArmStep step_of(const YamlValue& yaml, const std::filesystem::path& folder, cons
   }
   if (const auto push = yaml.find("push")) {
     const std::vector<YamlValue> pushes = push->is_list() ? push->items() : std::vector{*push};
-    for (const YamlValue& one : pushes) step.pushes.push_back(push_of(one, setup));
+    for (const YamlValue& one : pushes) {
+      step.pushes.push_back(push_of(one, setup));
+      const double end_s = step.pushes.back().start_s + step.pushes.back().duration_s;
+      if (step.duration_s > 0.0 && end_s > step.duration_s + kArmTick_s)
+        one.refuse(fmt::format("a push that ends within the {:g} s of its step", step.duration_s),
+                   "Make the step longer, or at and for smaller.");
+    }
   }
   if (const auto plate = yaml.find("plate")) step.plate = plate_of(*plate);
   return step;
@@ -261,8 +270,11 @@ ArmProgram read_arm_program(const std::string& path, const ArmSetup& setup,
   const YamlValue steps = yaml.at("program");
   if (!steps.is_list() || steps.items().empty() || steps.items().size() > kMaxSteps)
     steps.refuse(fmt::format("a list of 1 to {} steps", kMaxSteps));
-  for (const YamlValue& step : steps.items())
+  for (const YamlValue& step : steps.items()) {
     program.steps.push_back(step_of(step, folder, setup, progress));
+    if (program.steps.back().task == ArmTask::follow)
+      program.files.push_back((folder / step.at("follow").text()).string());
+  }
   try {
     require_possible(program, setup);
   } catch (const Error& error) {

@@ -212,6 +212,8 @@ class Runner {
       }
     }
     run.duration_s = session_.time_s();
+    run.refused_s = static_cast<double>(refused_ticks_) * kArmTick_s;
+    run.refused_from_s = refused_from_s_;
     std::move(watch_).finish(run);
     std::move(log_).finish(run);
     return run;
@@ -233,6 +235,8 @@ class Runner {
                          : run.cause != ArmStopCause::none ? ArmLoad{}
                                                            : reference_.load();
     const ArmController::Output& output = session_.control(wanted);
+    if (!is_over && output.is_reference_refused && refused_ticks_++ == 0)
+      refused_from_s_ = session_.time_s();
     watch_.see(output, setup_.arm, session_.time_s(), is_pushing(load));
     log_.see(bench);
     session_.act(load);
@@ -263,6 +267,8 @@ class Runner {
   Vector3 stopped_at_m_ = {};
   std::size_t since_contact_ = 0;  ///< ticks since a reaction began
   bool has_reacted_ = false;
+  std::size_t refused_ticks_ = 0;
+  double refused_from_s_ = 0.0;
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <numbers>
 #include <string_view>
 
 #include "data/names.hpp"
@@ -77,6 +78,16 @@ BodyInertia payload_of(const YamlValue& yaml) {
   return payload;
 }
 
+DataSheet sheet_of(const YamlValue& yaml, const std::string& name, const Progress& progress) {
+  try {
+    return find_data_sheet(name, progress);
+  } catch (const UsageError& error) {
+    ErrorReport report = error.report();
+    report.place = yaml.place();
+    throw Error(std::move(report));
+  }
+}
+
 ArmJointSetup joint_of(const YamlValue& yaml, const std::filesystem::path& folder,
                        const Progress& progress) {
   yaml.allow_only({"actuator", "model", "monitor"});
@@ -86,7 +97,7 @@ ArmJointSetup joint_of(const YamlValue& yaml, const std::filesystem::path& folde
   };
   std::string name = actuator.text();
   if (is_sheet_file(name)) name = beside(name);
-  ArmJointSetup joint{.sheet = find_data_sheet(name, progress)};
+  ArmJointSetup joint{.sheet = sheet_of(actuator, name, progress)};
   if (joint.sheet.family != ActuatorFamily::series_elastic)
     actuator.refuse("a series-elastic actuator: dfki-28, dfki-50, dfki-120 or dfki-300");
   if (const auto model = yaml.find("model")) joint.model = beside(model->text());
@@ -110,6 +121,16 @@ void take_joints(ArmSetup& setup, const YamlValue& yaml, const std::filesystem::
   }
 }
 
+/// A joint is as fast and as strong as both its URDF file and its actuator permit.
+void limit_to_actuators(ArmSetup& setup) {
+  for (std::size_t j = 0; j < setup.joints.size(); ++j) {
+    const RatingSheet& rating = setup.joints[j].sheet.rating;
+    ArmJoint& joint = setup.arm.joints[j];
+    joint.speed_rad_s = std::min(joint.speed_rad_s, rating.speed_rad_s.value);
+    joint.effort_Nm = std::min(joint.effort_Nm, rating.torque_Nm.value);
+  }
+}
+
 ArmSetup parse(const YamlValue& yaml, const std::filesystem::path& folder, const ReadText& read,
                const Progress& progress) {
   yaml.allow_only({"urdf", "base_tilt", "payload", "speed_up", "joints"});
@@ -124,8 +145,14 @@ ArmSetup parse(const YamlValue& yaml, const std::filesystem::path& folder, const
     speed_up_s = given->positive_number("s");
     if (speed_up_s > kSlowestSpeedUp_s) given->refuse("a time of at most 60 s");
   }
-  setup.moves = move_limits(setup.arm, speed_up_s);
   take_joints(setup, yaml.at("joints"), folder, progress);
+  limit_to_actuators(setup);
+  setup.files.push_back(file);
+  for (const ArmJointSetup& joint : setup.joints) {
+    for (const std::string& of : {joint.model, joint.monitor})
+      if (!of.empty()) setup.files.push_back(of);
+  }
+  setup.moves = move_limits(setup.arm, speed_up_s);
   require_carriable(setup, yaml.find("payload").value_or(yaml).place());
   return setup;
 }
@@ -149,9 +176,8 @@ JointControllerCore::Settings control_of(const ArmJoint& joint, const DataSheet&
   elastic.joint_inertia_kg_m2 = joint_inertia_kg_m2;
   const Drive& drive = elastic.drive;
   const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
-  const double wound_rad = sheet.rating.torque_Nm.value / elastic.stiffness_Nm_rad;
-  return {.torque = {.deflection = {.joint = elastic},
-                     .largest_torque_Nm = sheet.rating.torque_Nm.value},
+  const double wound_rad = joint.effort_Nm / elastic.stiffness_Nm_rad;
+  return {.torque = {.deflection = {.joint = elastic}, .largest_torque_Nm = joint.effort_Nm},
           .limits = {.lowest_rad = joint.lowest_rad - wound_rad,
                      .highest_rad = joint.highest_rad + wound_rad,
                      .speed_rad_s = sheet.rating.speed_rad_s.value,
@@ -159,6 +185,53 @@ JointControllerCore::Settings control_of(const ArmJoint& joint, const DataSheet&
                      .max_measured_load_Nm = kMeasuredShare * rated_Nm},
           .override_rad_s = kOverride_rad_s,
           .gains = JointCascade::gains_for(drive, kOverride_rad_s)};
+}
+
+/// @throws Error with the joint's name
+void use_model(ArmController::Joint& joint, const std::string& file, const std::string& name) {
+  try {
+    const ModelFile model = load_model(file);
+    joint.estimator.emplace(make_estimator(model, kBenchRate_Hz));
+    joint.inverse = AnyInverse::of(model.settings, model.parameters);
+  } catch (const Error& error) {
+    ErrorReport report = error.report();
+    report.place = fmt::format("model of joint '{}': {}", name, report.place);
+    throw Error(std::move(report));
+  }
+}
+
+/// The largest torque of gravity on a joint near this pose, one angle after the other: in each of them it is
+/// a + b cos q + c sin q, of which three values determine all.
+double climbed_torque(const ArmDynamics& dynamics, const ArmModel& arm, std::size_t joint,
+                      ArmDynamics::PerJoint angle_rad, double largest_Nm) {
+  constexpr int kSweeps = 20;
+  ArmDynamics::PerJoint torque_Nm = {};
+  const auto at = [&](std::size_t axis, double q) {
+    angle_rad[axis] = q;
+    dynamics.gravity_torque(angle_rad, torque_Nm);
+    return torque_Nm[joint];
+  };
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (std::size_t axis = 0; axis < dynamics.size(); ++axis) {
+      double best_rad = angle_rad[axis];
+      const double ahead = at(axis, 0.0);
+      const double beside = at(axis, 0.5 * std::numbers::pi);
+      const double opposite = at(axis, std::numbers::pi);
+      const double mean = 0.5 * (ahead + opposite);
+      const double turned = std::atan2(beside - mean, ahead - mean);
+      const ArmJoint& limits = arm.joints[axis];
+      for (const double q : {turned, turned + std::numbers::pi, turned - std::numbers::pi,
+                             limits.lowest_rad, limits.highest_rad}) {
+        if (!(q >= limits.lowest_rad && q <= limits.highest_rad)) continue;
+        const double reached_Nm = std::abs(at(axis, q));
+        if (reached_Nm <= largest_Nm) continue;
+        largest_Nm = reached_Nm;
+        best_rad = q;
+      }
+      angle_rad[axis] = best_rad;
+    }
+  }
+  return largest_Nm;
 }
 
 }  // namespace
@@ -182,17 +255,20 @@ ArmSetup arm6_setup() {
 void require_carriable(const ArmSetup& setup, const std::string& place) {
   const std::vector<double> needed_Nm = largest_gravity_torques(setup.arm);
   for (std::size_t j = 0; j < needed_Nm.size(); ++j) {
-    const double rated_Nm = setup.joints[j].sheet.rating.torque_Nm.value;
-    if (needed_Nm[j] <= kLargestStaticShare * rated_Nm) continue;
+    const double largest_Nm = setup.arm.joints[j].effort_Nm;
+    if (needed_Nm[j] <= kLargestStaticShare * largest_Nm) continue;
+    const bool is_payload = setup.arm.payload.mass_kg > 0.0;
     throw Error({.place = place,
-                 .problem = fmt::format("the payload is beyond the rating of joint '{}'",
+                 .problem = fmt::format("the {} beyond the rating of joint '{}'",
+                                        is_payload ? "payload is" : "weight of the links is",
                                         setup.arm.joints[j].name),
                  .expected = fmt::format("a weight of arm and payload that needs at most {:g} % of "
-                                         "the rated {:.4g} Nm in any pose",
-                                         100.0 * kLargestStaticShare, rated_Nm),
+                                         "the largest {:.4g} Nm in any pose",
+                                         100.0 * kLargestStaticShare, largest_Nm),
                  .found = fmt::format("{:.4g} Nm", needed_Nm[j]),
-                 .advice = "Reduce the payload or the limits of the joints in the URDF, or take a "
-                           "stronger actuator."});
+                 .advice = fmt::format("Reduce {}the limits of the joints in the URDF, or take a "
+                                       "stronger actuator; the effort of the URDF limits it, too.",
+                                       is_payload ? "the payload or " : "")});
   }
 }
 
@@ -200,6 +276,7 @@ std::vector<double> largest_gravity_torques(const ArmModel& arm) {
   const ArmDynamics dynamics(arm);
   const std::size_t count = arm.joints.size();
   std::vector<double> largest_Nm(count, 0.0);
+  std::vector<ArmDynamics::PerJoint> worst_rad(count);
   Random random(kPoseSeed);
   ArmDynamics::PerJoint angle_rad = {};
   ArmDynamics::PerJoint torque_Nm = {};
@@ -207,9 +284,14 @@ std::vector<double> largest_gravity_torques(const ArmModel& arm) {
     for (std::size_t j = 0; j < count; ++j)
       angle_rad[j] = random.uniform(arm.joints[j].lowest_rad, arm.joints[j].highest_rad);
     dynamics.gravity_torque(angle_rad, torque_Nm);
-    for (std::size_t j = 0; j < count; ++j)
-      largest_Nm[j] = std::max(largest_Nm[j], std::abs(torque_Nm[j]));
+    for (std::size_t j = 0; j < count; ++j) {
+      if (std::abs(torque_Nm[j]) <= largest_Nm[j]) continue;
+      largest_Nm[j] = std::abs(torque_Nm[j]);
+      worst_rad[j] = angle_rad;
+    }
   }
+  for (std::size_t j = 0; j < count; ++j)
+    largest_Nm[j] = climbed_torque(dynamics, arm, j, worst_rad[j], largest_Nm[j]);
   return largest_Nm;
 }
 
@@ -225,14 +307,10 @@ ArmController::Settings arm_controller_settings(
         .stop = joint_stop_settings(sheet, weight_Nm[j]),
         .bearing_Nm = sheet.joint.bearing_friction_Nm.value,
         .viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value,
-        .guiding_friction_Nm = kGuidingShare * sheet.rating.torque_Nm.value,
-        .largest_external_Nm = kOverloadShare * sheet.rating.torque_Nm.value};
+        .guiding_friction_Nm = kGuidingShare * setup.arm.joints[j].effort_Nm,
+        .largest_external_Nm = kOverloadShare * setup.arm.joints[j].effort_Nm};
     joint.inverse = LinearInverse(joint.control.torque.deflection.joint.stiffness_Nm_rad);
-    if (!from.model.empty()) {
-      const ModelFile model = load_model(from.model);
-      joint.estimator.emplace(make_estimator(model, kBenchRate_Hz));
-      joint.inverse = AnyInverse::of(model.settings, model.parameters);
-    }
+    if (!from.model.empty()) use_model(joint, from.model, setup.arm.joints[j].name);
     // A load cell is after the bearing: a model of its torque contains the friction of the bearing.
     if (!from.model.empty() || !from.monitor.empty())
       joint.bearing_Nm = joint.viscous_Nms_rad = 0.0;

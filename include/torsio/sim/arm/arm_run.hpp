@@ -49,10 +49,12 @@ struct ArmStep {
 /// Plain data: what an arm does, one step after the other.
 struct ArmProgram {
   std::vector<double> start_rad;
-  std::vector<ArmStep> steps = {};
-  ContactReaction reaction = ContactReaction::none;
-  CartesianImpedance::Settings cartesian = {.stiffness = {800.0, 800.0, 800.0, 40.0, 40.0, 40.0}};
+  std::vector<ArmStep> steps = {
+      std::vector<std::string> files = {};  ///< trajectories that were read
 };
+ContactReaction reaction = ContactReaction::none;
+CartesianImpedance::Settings cartesian = {.stiffness = {800.0, 800.0, 800.0, 40.0, 40.0, 40.0}};
+};  // namespace torsio
 
 /// Reads a program for this arm; docs/robot/arm.md has the format.
 ///
@@ -136,6 +138,9 @@ struct ArmRun {
   double stopped_s = 0.0;                ///< when; 0: not stopped
   std::optional<double> at_rest_s = {};  ///< from the stop until all drives were at rest
   double largest_drop_m = 0.0;           ///< how far the flange moved after the stop
+  /// How long references were refused, and the arm held: they began too far from the measured angles.
+  double refused_s = 0.0;
+  double refused_from_s = 0.0;  ///< when the first one was refused
   std::vector<ArmContact> contacts = {};
   std::optional<ArmImpact> impact = {};  ///< none: the flange touched no plate
 

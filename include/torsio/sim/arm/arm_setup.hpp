@@ -24,6 +24,7 @@ struct ArmSetup {
   ArmModel arm;                             ///< with its payload, gravity in the frame of its base
   std::vector<ArmJointSetup> joints = {};   ///< one per joint of the arm
   std::vector<JointMoveLimits> moves = {};  ///< limits of the joints in moves
+  std::vector<std::string> files = {};      ///< its URDF file, data sheets, models and monitors
 };
 
 /// Reads an arm; docs/robot/arm.md has the format.
@@ -35,6 +36,8 @@ struct ArmSetup {
 ///     joints:
 ///       joint1: {actuator: dfki-300}
 ///       joint2: {actuator: "dfki-300:bouc-wen#03", model: joint2.safetensors, monitor: joint2.monitor.json}
+///
+/// A joint is as fast and as strong as both the limits of the URDF file and the rating of its actuator permit.
 ///
 /// @throws Error naming file, line, what was expected and found: as `read_urdf`, a joint of the arm without an actuator, an
 /// actuator for a joint that the arm does not have, an actuator that is not series-elastic, a payload under which the
