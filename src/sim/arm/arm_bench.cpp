@@ -67,7 +67,7 @@ void ArmBench::sense() {
     Joint& joint = joints_[j];
     joint.measured = joint.sensors.step(sensed(j), plant_.torques(j).joint_Nm);
     if (joint.has_faults) joint.faults.apply(joint.measured, time_s());
-    samples_[j] = {.t_s = time_s(),
+    samples_[j] = {.t_s = static_cast<double>(before_ticks_ + tick_) / kBenchRate_Hz,
                    .motor_angle_rad = joint.measured.motor_angle_rad,
                    .gear_angle_rad = joint.measured.middle_angle_rad,
                    .joint_angle_rad = joint.measured.joint_angle_rad,

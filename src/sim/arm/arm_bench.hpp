@@ -38,8 +38,11 @@ class ArmBench {
     return joints_[joint].measured;
   }
   [[nodiscard]] std::span<const JointSample> samples() const noexcept { return samples_; }
-  /// Faults begin to count from here.
-  void start_clock() noexcept { tick_ = 0; }
+  /// Faults and `time_s` begin to count from here; the time of the samples continues.
+  void start_clock() noexcept {
+    before_ticks_ += tick_;
+    tick_ = 0;
+  }
   /// Advances to the next tick. @throws Error if the arm refuses.
   void act(std::span<const Command> commands, const ArmLoad& load);
 
@@ -78,6 +81,7 @@ class ArmBench {
   std::vector<JointSample> samples_;
   std::vector<PlantCommand> commands_;
   std::size_t tick_ = 0;
+  std::size_t before_ticks_ = 0;  ///< until the clock was started
 };
 
 }  // namespace torsio

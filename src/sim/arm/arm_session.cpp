@@ -57,7 +57,7 @@ const ArmController::Output& ArmSession::control(const ArmReference& wanted) {
     speed_rad_s_[j] = joint.speed_rad_s;
     MonitoredTorque* const monitored = controller_.monitored(j);
     if (monitored != nullptr && monitored->monitor().state() == Monitor::State::ready)
-      monitored->monitor().arm(time_s());
+      monitored->monitor().arm(bench_.samples()[j].t_s);
   }
   return output;
 }
