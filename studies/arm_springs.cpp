@@ -19,27 +19,29 @@
 namespace torsio {
 namespace {
 
-constexpr double kSweep_s = 60.0;
-constexpr double kChirp_s = 60.0;
-constexpr double kNoise_s = 60.0;
+constexpr double kBench_s = 50.0;  // each recording
 constexpr std::size_t kSerials = 99;
-constexpr double kLightLoad = 0.1;  // shares of the rated torque
-constexpr double kHeavyLoad = 0.5;
+// Torques over the rating: weight of the lever, amplitude of the chirp, root mean square of the noise.
+constexpr double kSweepShare = 0.5;
+constexpr double kChirpShare = 0.8;
+constexpr double kNoiseShare = 0.3;
+constexpr double kFaintShare = 0.04;
 
 Dataset bench_recordings(const std::string& actuator, std::uint64_t seed) {
   const DataSheet sheet = data_sheet(actuator);
+  const double rated_Nm = sheet.rating.torque_Nm.value;
+  // A sweep moves the joint: in a locked one every motion would be a jump of an encoder.
   const std::array specs{
-      ExperimentSpec{
-          .experiment = "sweep", .duration_s = kSweep_s, .lever_m = lever_m(sheet, kLightLoad)},
-      ExperimentSpec{
-          .experiment = "sweep", .duration_s = kSweep_s, .lever_m = lever_m(sheet, kHeavyLoad)},
-      ExperimentSpec{.experiment = "chirp", .duration_s = kChirp_s},
-      ExperimentSpec{.experiment = "random-walk", .duration_s = kNoise_s}};
+      ExperimentSpec{.experiment = "sweep", .lever_m = lever_m(sheet, kSweepShare)},
+      ExperimentSpec{.experiment = "chirp", .torque_amplitude_Nm = kChirpShare * rated_Nm},
+      ExperimentSpec{.experiment = "random-walk", .torque_amplitude_Nm = kNoiseShare * rated_Nm},
+      ExperimentSpec{.experiment = "random-walk", .torque_amplitude_Nm = kFaintShare * rated_Nm}};
   Dataset dataset;
   for (std::size_t k = 0; k < specs.size(); ++k) {
     ExperimentSpec spec = specs[k];
     spec.actuator = actuator;
     spec.seed = seed + k;
+    spec.duration_s = kBench_s;
     Recording recording = simulate(spec);
     const std::size_t samples = recording.size();
     dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
@@ -65,6 +67,8 @@ ArmSetup arm_of_specimens(std::size_t arm, double payload_kg) {
 
 std::vector<ModelFile> bench_models(const ArmSetup& setup, std::string_view family,
                                     std::uint64_t seed, const Progress& progress) {
+  const std::vector<std::string> inputs{"spring_deflection_rad",
+                                        "lowpass(spring_deflection_rate_rad_s, 10Hz)"};
   std::vector<ModelFile> models;
   models.reserve(setup.joints.size());
   for (std::size_t j = 0; j < setup.joints.size(); ++j) {
@@ -72,20 +76,21 @@ std::vector<ModelFile> bench_models(const ArmSetup& setup, std::string_view fami
     const Dataset dataset = bench_recordings(full_name(setup.joints[j].sheet), seed + 10 * j);
     models.push_back(
         train_model(dataset,
-                    {.family = std::string(family), .features = resolve_inputs(dataset, {})}, seed)
+                    {.family = std::string(family), .features = resolve_inputs(dataset, inputs)},
+                    seed)
             .file);
   }
   return models;
 }
 
 ArmController::Settings settings_with(const ArmSetup& setup, const std::vector<ModelFile>& models) {
-  ArmController::Settings settings = arm_controller_settings(setup);
+  ArmSetup nominal = arm6_setup();
+  nominal.arm = setup.arm;
+  ArmController::Settings settings = arm_controller_settings(nominal);
   for (std::size_t j = 0; j < settings.joints.size(); ++j) {
     ArmController::Joint& joint = settings.joints[j];
     joint.estimator.emplace(make_estimator(models[j], kBenchRate_Hz));
     joint.inverse = AnyInverse::of(models[j].settings, models[j].parameters);
-    // The load cell of a bench is after the bearing.
-    joint.bearing_Nm = joint.viscous_Nms_rad = 0.0;
   }
   return settings;
 }

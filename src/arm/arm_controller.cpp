@@ -275,7 +275,8 @@ void ArmController::supervise(std::span<const JointSample> samples) noexcept {
     if (axis.monitored && axis.monitored->monitor().state() == Monitor::State::stopped)
       find(ArmStopCause::monitor, j);
     const bool is_overloaded = std::abs(output_.joints[j].external_Nm) > axis.largest_external_Nm;
-    axis.overloaded_s = is_overloaded ? axis.overloaded_s + period_s_ : 0.0;
+    // A retreat from a contact is not stopped by the contact's force: the arm would stay clamped.
+    axis.overloaded_s = is_overloaded && !is_yielding() ? axis.overloaded_s + period_s_ : 0.0;
     if (axis.overloaded_s > settings_.longest_overload_s) find(ArmStopCause::overload, j);
   }
 }

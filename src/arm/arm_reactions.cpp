@@ -10,6 +10,7 @@ namespace torsio {
 namespace {
 
 constexpr double kContactEnd_s = 0.2;  // below its thresholds for this time, a contact is over
+constexpr double kYielding_s = 0.3;    // time in which a reaction ends an overload
 
 }  // namespace
 
@@ -79,9 +80,17 @@ void ArmController::react(const ArmReference& reference) noexcept {
     }
   }
   is_reacting_ = true;
+  reacting_s_ = 0.0;
+}
+
+bool ArmController::is_yielding() const noexcept {
+  return is_reacting_ && reacting_s_ < kYielding_s &&
+         (settings_.reaction == ContactReaction::retract ||
+          settings_.reaction == ContactReaction::floating);
 }
 
 const ArmReference& ArmController::reaction_reference() noexcept {
+  reacting_s_ += period_s_;
   if (reacting_.mode != ArmMode::position) return reacting_;
   const ReactionMotion::Output& motion = reaction_.step();
   reacting_.position_rad = motion.position_rad;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "sim/arm/arm_bench.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/monitored_joint.hpp"
+#include "torsio/arm/flange_wrench.hpp"
 #include "torsio/sim/arm/arm_run.hpp"
 
 namespace torsio {
@@ -18,6 +20,9 @@ namespace {
 ArmController controller() {
   ArmController::Settings settings = arm_controller_settings(
       arm6_setup(), CartesianImpedance::Settings{.stiffness = {800, 800, 800, 40, 40, 40}});
+  settings.contacts.emplace();
+  settings.contacts->joints.assign(
+      settings.joints.size(), {.error = {.coefficients = {0.01, 0.1, 0.001, 0.01}}, .factor = 4.0});
   for (std::size_t j = 0; j < 3; ++j)
     settings.joints[j].monitored.emplace(test::torque_sources(test::joint_sources()),
                                          test::joint_redundancy(), test::tolerant_monitor());
@@ -67,6 +72,44 @@ TEST(ArmController, NeverUsesTheHeapInAnyMode) {
     is_stopped = is_stopped || mode == ArmMode::joints;
   }
   EXPECT_TRUE(is_released);
+  EXPECT_EQ(calls, 0U);
+}
+
+TEST(ArmController, NeverUsesTheHeapInAReaction) {
+  const ArmSetup setup = arm6_setup();
+  const std::vector<double> start_rad = arm6_program().start_rad;
+  ArmBench bench(setup, FirstStageForm::rigid, {}, 1, start_rad);
+  ArmController arm = controller();
+  std::vector<ArmBench::Command> commands(setup.joints.size());
+  ArmReference reference;
+  std::ranges::copy(start_rad, reference.position_rad.begin());
+  bool is_released = false;
+  std::size_t calls = 0;
+  std::size_t reactions = 0;
+  for (int n = 0; n < 12'000; ++n) {
+    bench.sense();
+    const std::vector<JointSample> samples(bench.samples().begin(), bench.samples().end());
+    const ArmController::Output* output = nullptr;
+    calls += test::heap_calls_during([&] {
+      if (n % 3000 == 1000)
+        arm.set_reaction(std::array{ContactReaction::hold, ContactReaction::retract,
+                                    ContactReaction::floating,
+                                    ContactReaction::stop}[static_cast<std::size_t>(n / 3000)]);
+      if (n % 3000 == 2900) arm.end_reaction();
+      output = &arm.step(reference, samples);
+      if (!is_released) is_released = arm.release();
+      (void)flange_wrench(arm.dynamics(), start_rad, start_rad, start_rad);
+    });
+    if (output->contact.reaction != ContactReaction::none) ++reactions;
+    for (std::size_t j = 0; j < commands.size(); ++j)
+      commands[j] = {output->joints[j].current_A, output->joints[j].is_powered,
+                     output->joints[j].is_brake_open};
+    ArmLoad load;
+    if (n % 3000 > 2000 && n % 3000 < 2200) load.force_N = {0.0, 0.0, 80.0};
+    bench.act(commands, load);
+  }
+  EXPECT_TRUE(is_released);
+  EXPECT_GT(reactions, 1000U);
   EXPECT_EQ(calls, 0U);
 }
 

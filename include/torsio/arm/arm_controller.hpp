@@ -237,6 +237,8 @@ class ArmController {
   void find_contact(const ArmReference& reference, std::span<const JointSample> samples) noexcept;
   void react(const ArmReference& reference) noexcept;
   const ArmReference& reaction_reference() noexcept;
+  /// In a retreat or floating, shortly after a contact.
+  [[nodiscard]] bool is_yielding() const noexcept;
   [[nodiscard]] bool is_usable(const ArmReference& reference) const noexcept;
   [[nodiscard]] bool is_near(const ArmReference& reference) const noexcept;
   void hold() noexcept;
@@ -264,6 +266,7 @@ class ArmController {
   double proof_s_ = 0.0;  ///< since all joints run
   ArmReference reacting_ = {};  ///< the reference that a reaction makes
   bool is_reacting_ = false;
+  double reacting_s_ = 0.0;    ///< since the reaction began
   double no_contact_s_ = 0.0;  ///< since a threshold was exceeded
   bool is_started_ = false;
   bool is_holding_ = false;
