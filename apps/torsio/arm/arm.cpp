@@ -243,6 +243,8 @@ void add_arm(CLI::App& app) {
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
   flags->report.add(*verb);
+  add_arm_calibrate(*verb);
+  add_arm_excite(*verb);
   add_arm_identify(*verb);
   verb->callback([flags, verb] {
     if (verb->get_subcommands().empty()) run(*flags);
