@@ -15,6 +15,7 @@ Study collision_002(const StudyOptions& options, const Progress& progress);
 Study coupling_003(const StudyOptions& options, const Progress& progress);
 Study models_003(const StudyOptions& options, const Progress& progress);
 Study arm_000(const StudyOptions& options, const Progress& progress);
+Study arm_identification_000(const StudyOptions& options, const Progress& progress);
 Study transfer_000(const StudyOptions& options, const Progress& progress);
 Study brake_000(const StudyOptions& options, const Progress& progress);
 Study torque_tracking_000(const StudyOptions& options, const Progress& progress);

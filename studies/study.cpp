@@ -49,6 +49,8 @@ constexpr std::array kStudies{
               {},
               false,
               true},
+    StudyInfo{"000-arm-identification", "000, section 6.4; ours",
+              "Payload, links and springs of an arm from its motion", arm_identification_000},
     StudyInfo{"000-transfer",
               "000, Figures 10 to 12",
               "A model of one actuator on others",

@@ -259,14 +259,15 @@ MomentumWindows momentum_windows(const ArmModel& arm, std::span<const ArmMotion>
     count += all.emplace_back(arm, motion, settings).count();
     longest_s += static_cast<double>(motion.angle_rad.front().size()) / motion.sample_rate_Hz;
   }
-  if (count < kLeastWindows)
-    throw Error({.place = motions.empty() ? arm.name : motions.front().name,
-                 .problem = "the motion is too short",
-                 .expected = fmt::format("at least {} windows of {:g} s, {:.3g} s", kLeastWindows,
-                                         settings.window_s,
-                                         static_cast<double>(kLeastWindows) * settings.window_s),
-                 .found = fmt::format("{:.3g} s", longest_s),
-                 .advice = "Record several moves: 'torsio arm excite' writes a program of them."});
+  if (count < settings.least_windows)
+    throw Error(
+        {.place = motions.empty() ? arm.name : motions.front().name,
+         .problem = "the motion is too short",
+         .expected = fmt::format("at least {} windows of {:g} s, {:.3g} s", settings.least_windows,
+                                 settings.window_s,
+                                 static_cast<double>(settings.least_windows) * settings.window_s),
+         .found = fmt::format("{:.3g} s", longest_s),
+         .advice = "Record several moves: 'torsio arm excite' writes a program of them."});
   const std::size_t joints = arm.joints.size();
   MomentumWindows windows{.columns = {},
                           .torque_Nm = Eigen::VectorXd::Zero(eigen_index(count * joints)),

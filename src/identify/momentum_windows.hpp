@@ -23,9 +23,10 @@ using BodyJacobian = Eigen::Matrix<double, kBodyParameters, kBodyParameters>;
 [[nodiscard]] BodyJacobian parameters_by_body(const BodyInertia& body);
 
 struct WindowSettings {
-  double window_s;
-  double speed_window_s;
-  double friction_speed_rad_s;
+  double window_s = 0.25;
+  double speed_window_s = 0.03;
+  double friction_speed_rad_s = 0.02;
+  std::size_t least_windows = 24;
 };
 
 /// The equations of all windows, one row per window and joint, divided by the length of a window:
@@ -51,11 +52,10 @@ struct MomentumWindows {
   [[nodiscard]] Eigen::Index friction_column() const { return body_column(joints + 1); }
 };
 
-/// @throws Error if the motions are shorter than `kLeastWindows` windows together.
+/// @throws Error if the motions are shorter than `least_windows` together.
 [[nodiscard]] MomentumWindows momentum_windows(const ArmModel& arm,
                                                std::span<const ArmMotion> motions,
                                                const WindowSettings& settings);
-inline constexpr std::size_t kLeastWindows = 24;
 
 /// The columns of one state: how momentum, energy gradient less gravity follow from the parameters.
 struct MomentumColumns {

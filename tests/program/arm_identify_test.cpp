@@ -73,6 +73,20 @@ TEST_F(ArmIdentify, FindsThePayloadAndWritesTheLineOfTheArm) {
   EXPECT_EQ(contents("weak_payload.yaml"), "");
 }
 
+TEST_F(ArmIdentify, CorrectsTheLinks) {
+  record();
+  const Outcome outcome =
+      torsio("arm identify moves.csv --links --test moves.csv --json found.json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("in parentheses: not determined"), std::string::npos) << outcome.out;
+  const auto document = nlohmann::json::parse(contents("found.json"));
+  ASSERT_EQ(document["links"].size(), 6U);
+  EXPECT_FALSE(document["links"][0]["mass_kg"]["is_determined"]);
+  EXPECT_EQ(document["test_rmse_after_Nm"].size(), 6U);
+  expect_refusal("moves.csv --test moves.csv", "--links beside it");
+  expect_refusal("moves.csv --links -o payload.yaml", "it is for the payload");
+}
+
 TEST_F(ArmIdentify, RefusesRecordingsThatDetermineNothingWithPlaceAndReason) {
   write_rows("still.csv", 3000, "0.5");
   expect_refusal("still.csv", "the arm does not move");

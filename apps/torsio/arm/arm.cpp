@@ -340,6 +340,8 @@ void add_arm(CLI::App& app) {
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
   flags->report.add(*verb);
+  add_arm_calibrate(*verb);
+  add_arm_excite(*verb);
   add_arm_identify(*verb);
   add_learn_contacts(*verb);
   for (CLI::App* part : verb->get_subcommands({}))

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "arm/arm_identify_links.hpp"
 #include "arm/arm_verbs.hpp"
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
@@ -30,9 +31,15 @@ struct IdentifyFlags {
   std::string links_com;
   double torque_within_percent = 1.0;
   double links_within_percent = 0.0;
+  bool has_links = false;
+  std::vector<std::string> tests;
   std::string output;
   JsonOutput json;
 };
+
+// Assumed of the links with `--links`.
+constexpr double kLinkShare = 0.1;
+constexpr double kLinkCom_m = 0.01;
 
 constexpr std::array kInertiaNames{"xx", "yy", "zz", "xy", "xz", "yz"};
 
@@ -162,7 +169,33 @@ void write_payload(const IdentifyFlags& flags, torsio::ArmSetup setup,
   remark(fmt::format("{}: the line 'payload' for the arm's file", flags.output));
 }
 
+/// `--links`: the payload is that of the arm's file.
+void identify_links_of(const IdentifyFlags& flags, const torsio::ArmSetup& setup,
+                       const std::vector<torsio::ArmMotion>& motions,
+                       const torsio::Progress& progress) {
+  torsio::IdentificationOptions options = options_of(flags, setup);
+  if (flags.links_within_percent == 0.0) options.link_share = kLinkShare;
+  if (flags.links_com.empty()) options.link_com_m = kLinkCom_m;
+  const torsio::IdentifiedLinks found = torsio::identify_links(setup.arm, motions, options);
+  std::vector<double> before;
+  std::vector<double> after;
+  if (!flags.tests.empty()) {
+    const std::vector<torsio::ArmMotion> tests = motions_of(flags.tests, setup.arm, progress);
+    before = torsio::torque_residuals(setup.arm, found.modelled_joints, tests, options);
+    after = torsio::torque_residuals(found.arm, found.joints, tests, options);
+  }
+  if (flags.json.wants_tables()) print(links_text(found, before, after));
+  flags.json.write(torsio::json_text(links_json(found, before, after)));
+}
+
 void identify(IdentifyFlags& flags) {
+  if (!flags.has_links && !flags.tests.empty())
+    throw torsio::UsageError(
+        {.place = "--test", .expected = "--links beside it", .found = "--test alone"});
+  if (flags.has_links && !flags.output.empty())
+    throw torsio::UsageError({.place = "--output",
+                              .expected = "no output beside --links: it is for the payload",
+                              .found = "'" + flags.output + "'"});
   DataFlags data;
   data.recordings = flags.recordings;
   data.check_outputs({flags.output, flags.json.destination},
@@ -175,6 +208,7 @@ void identify(IdentifyFlags& flags) {
         torsio::tilted_gravity(torsio::si_quantity(flags.tilt, "rad", "--tilt"));
   const std::vector<torsio::ArmMotion> motions =
       motions_of(flags.recordings, setup.arm, progress.listener());
+  if (flags.has_links) return identify_links_of(flags, setup, motions, progress.listener());
   const torsio::IdentifiedPayload found =
       torsio::identify_payload(setup.arm, motions, options_of(flags, setup));
   if (flags.json.wants_tables()) print(payload_text(found));
@@ -197,7 +231,8 @@ void add_arm_identify(CLI::App& arm) {
   verb->add_option("RECORDING", flags->recordings,
                    "recordings of the arm with one payload, in any format that is read")
       ->required();
-  verb->add_option("--arm", flags->arm, "arm6, or FILE.yaml of your own; its payload is not used")
+  verb->add_option("--arm", flags->arm,
+                   "arm6, or FILE.yaml of your own; its payload is not used but with --links")
       ->capture_default_str();
   verb->add_option("--tilt", flags->tilt,
                    "tilt of the base about its y axis, in place of that of the arm's file: 30deg");
@@ -210,6 +245,11 @@ void add_arm_identify(CLI::App& arm) {
       ->capture_default_str();
   verb->add_option("--links-com", flags->links_com,
                    "distance by which the centre of mass of each link may differ from it: 2mm");
+  verb->add_flag("--links", flags->has_links,
+                 "correct the links instead: the payload is that of the arm's file, the links may "
+                 "differ by --links-within (default: 10) and --links-com (default: 10mm)");
+  verb->add_option("--test", flags->tests,
+                   "with --links: recordings of other moves, on which the torques are compared");
   verb->add_option("-o,--output", flags->output,
                    "text file for the line 'payload' of the arm's YAML file");
   verb->add_option("--json", flags->json.destination,

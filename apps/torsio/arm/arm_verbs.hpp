@@ -8,6 +8,8 @@
 
 // The verbs below `torsio arm`, each in a file of its own.
 
+void add_arm_calibrate(CLI::App& arm);
+void add_arm_excite(CLI::App& arm);
 void add_arm_identify(CLI::App& arm);
 
 /// The arm that comes with torsio.
