@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -50,7 +52,9 @@ std::vector<torsio::ArmMotion> motions_of(const std::vector<std::string>& files,
   for (const std::string& file : files) {
     torsio::LoadOptions options;
     options.progress = progress;
-    for (const torsio::Recording& recording : torsio::load_recordings(file, options)) {
+    const std::vector<torsio::Recording> recordings = torsio::load_recordings(file, options);
+    for (const torsio::Recording& recording : recordings) {
+      DataFlags::remark_on_reading(std::array{&recording});
       motions.push_back(torsio::arm_motion(recording, arm));
       motions.back().name = file;
     }
@@ -154,6 +158,50 @@ IdentifyJson identified_json(const IdentifyFlags& flags, const torsio::Identifie
   return document;
 }
 
+/// A torque with the wrong sign, unit or joint fits no payload.
+constexpr double kPlausibleShare = 0.1;  // residual over the largest torque of a joint
+constexpr double kSurely = 3.0;          // standard errors
+constexpr double kSmallShare = 0.05;     // of the links' mass, by which linear springs may err
+
+/// @throws Error if the mass is negative
+void require_plausible(const torsio::ArmSetup& setup, const torsio::IdentifiedPayload& found) {
+  const torsio::IdentifiedQuantity& mass = found.mass_kg;
+  double links_kg = 0.0;
+  for (const torsio::ArmJoint& joint : setup.arm.joints) links_kg += joint.body.mass_kg;
+  if (mass.value < -kSurely * mass.standard_error && mass.value < -kSmallShare * links_kg)
+    throw torsio::Error(
+        {.place = setup.arm.name,
+         .problem = "the torques fit a payload of negative mass",
+         .expected = "a mass of 0 kg or more",
+         .found = fmt::format("{:.3f} +- {:.3f} kg", mass.value, mass.standard_error),
+         .advice =
+             "Check the signs and units of the torques, the order of the joints, the tilt of the "
+             "base (--tilt) and the masses of the links in the URDF file."});
+  for (std::size_t j = 0; j < found.joints.size(); ++j) {
+    const double share = found.joints[j].residual_Nm / setup.arm.joints[j].effort_Nm;
+    if (share > kPlausibleShare)
+      remark(fmt::format(
+          "warning: the torque of {} differs from that of the arm by {:.3g} Nm, {:.0f} % "
+          "of its largest one: check its sign, its unit, the order of the joints and "
+          "the URDF file",
+          found.joints[j].name, found.joints[j].residual_Nm, 100.0 * share));
+  }
+}
+
+/// What the standard errors do not contain.
+void remark_on_springs(const torsio::ArmSetup& setup) {
+  std::vector<std::string> linear;
+  for (std::size_t j = 0; j < setup.joints.size(); ++j)
+    if (setup.joints[j].model.empty() && setup.joints[j].monitor.empty())
+      linear.push_back(setup.arm.joints[j].name);
+  if (linear.empty()) return;
+  remark(
+      fmt::format("warning: the arm's file has no model of {}: a linear spring without hysteresis "
+                  "estimates small torques too small, by up to half, which the standard errors do "
+                  "not contain; train models (docs/robot/arm.md)",
+                  fmt::join(linear, ", ")));
+}
+
 void write_payload(const IdentifyFlags& flags, torsio::ArmSetup setup,
                    const torsio::IdentifiedPayload& found) {
   if (!found.mass_kg.is_determined)
@@ -196,6 +244,13 @@ void identify(IdentifyFlags& flags) {
     throw torsio::UsageError({.place = "--output",
                               .expected = "no output beside --links: it is for the payload",
                               .found = "'" + flags.output + "'"});
+  for (std::size_t n = 1; n < flags.recordings.size(); ++n)
+    if (std::find(flags.recordings.begin(),
+                  flags.recordings.begin() + static_cast<std::ptrdiff_t>(n),
+                  flags.recordings[n]) != flags.recordings.begin() + static_cast<std::ptrdiff_t>(n))
+      throw torsio::UsageError({.place = "torsio arm identify",
+                                .expected = "each recording once",
+                                .found = "'" + flags.recordings[n] + "' again"});
   DataFlags data;
   data.recordings = flags.recordings;
   data.check_outputs({flags.output, flags.json.destination},
@@ -203,6 +258,7 @@ void identify(IdentifyFlags& flags) {
   if (!flags.output.empty()) require_writable(flags.output);
   ProgressBar progress;
   torsio::ArmSetup setup = arm_of(flags.arm, progress.listener());
+  data.check_outputs({flags.output, flags.json.destination}, setup.files);
   if (!flags.tilt.empty())
     setup.arm.gravity_m_s2 =
         torsio::tilted_gravity(torsio::si_quantity(flags.tilt, "rad", "--tilt"));
@@ -211,6 +267,8 @@ void identify(IdentifyFlags& flags) {
   if (flags.has_links) return identify_links_of(flags, setup, motions, progress.listener());
   const torsio::IdentifiedPayload found =
       torsio::identify_payload(setup.arm, motions, options_of(flags, setup));
+  require_plausible(setup, found);
+  remark_on_springs(setup);
   if (flags.json.wants_tables()) print(payload_text(found));
   flags.json.write(torsio::json_text(identified_json(flags, found)));
   if (!flags.output.empty()) write_payload(flags, std::move(setup), found);

@@ -49,12 +49,11 @@ struct ArmStep {
 /// Plain data: what an arm does, one step after the other.
 struct ArmProgram {
   std::vector<double> start_rad;
-  std::vector<ArmStep> steps = {
-      std::vector<std::string> files = {};  ///< trajectories that were read
+  std::vector<ArmStep> steps = {};
+  ContactReaction reaction = ContactReaction::none;
+  CartesianImpedance::Settings cartesian = {.stiffness = {800.0, 800.0, 800.0, 40.0, 40.0, 40.0}};
+  std::vector<std::string> files = {};  ///< trajectories that were read
 };
-ContactReaction reaction = ContactReaction::none;
-CartesianImpedance::Settings cartesian = {.stiffness = {800.0, 800.0, 800.0, 40.0, 40.0, 40.0}};
-};  // namespace torsio
 
 /// Reads a program for this arm; docs/robot/arm.md has the format.
 ///
