@@ -161,7 +161,7 @@ IdentifyJson identified_json(const IdentifyFlags& flags, const torsio::Identifie
 /// A torque with the wrong sign, unit or joint fits no payload.
 constexpr double kPlausibleShare = 0.1;  // residual over the largest torque of a joint
 constexpr double kSurely = 3.0;          // standard errors
-constexpr double kSmallShare = 0.05;     // of the links' mass, by which linear springs may err
+constexpr double kSmallShare = 0.05;     // share of the mass of all links, by which linear springs may err
 
 /// @throws Error if the mass is negative
 void require_plausible(const torsio::ArmSetup& setup, const torsio::IdentifiedPayload& found) {
