@@ -39,6 +39,7 @@ std::vector<double> estimated(const ArmRun& run, std::size_t joint, const ModelF
 ModelFile spring_model(const std::string& family, std::vector<Recording> recordings,
                        std::uint64_t seed) {
   Dataset dataset;
+  dataset.records.reserve(recordings.size());
   for (Recording& recording : recordings) {
     const std::size_t samples = recording.size();
     dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
@@ -55,6 +56,7 @@ BenchedArm benched_arm(std::size_t number, std::uint64_t seed, bool is_quick,
     joint.sheet = data_sheet(fmt::format("{}#{:02}", joint.sheet.name, 1 + 6 * number + j));
     const SweepProtocol protocol = sweep_protocol(joint.sheet);
     std::vector<Recording> sweeps;
+    sweeps.reserve(protocol.train_lever_m.size());
     for (std::size_t k = is_quick ? 2 : 0; k < protocol.train_lever_m.size(); ++k)
       sweeps.push_back(simulate(joint.sheet,
                                 {.experiment = "sweep",

@@ -14,6 +14,7 @@ namespace {
 constexpr double kFrictionShare = 0.02;  // standard deviation of a friction, of the largest torque
 constexpr double kLeastInertiaShare =
     1e-3;  // share of the largest moment: a product of 0 may differ, too
+constexpr double kLargestScale = 1.0;
 constexpr double kDeterminedFriction = 0.5;  // standard error over that of the prior
 
 double friction_std(const ArmModel& arm, std::size_t joint) {
@@ -40,6 +41,18 @@ class FreeColumns {
     if (has_scale()) size_ += eigen_index(windows.joints);
   }
 
+  /// The standard deviation of the scale of a joint's torque.
+  [[nodiscard]] double scale_std(std::size_t joint) const {
+    double squares = 0.0;
+    for (std::size_t w = 0; w < windows_.windows(); ++w) {
+      const double torque_Nm = windows_.torque_Nm(eigen_index(w * windows_.joints + joint));
+      squares += torque_Nm * torque_Nm;
+    }
+    const double rms_Nm = std::sqrt(squares / static_cast<double>(windows_.windows()));
+    const double floor_Nm = options_.torque_floor_share * arm_.joints[joint].effort_Nm;
+    return std::hypot(options_.torque_scale_share,
+                      std::min(kLargestScale, rms_Nm > 0.0 ? floor_Nm / rms_Nm : kLargestScale));
+  }
   [[nodiscard]] bool has_scale() const { return options_.torque_scale_share > 0.0; }
   [[nodiscard]] const std::vector<std::optional<Eigen::Index>>& first() const { return first_; }
   [[nodiscard]] Eigen::Index friction(std::size_t joint) const {
@@ -91,9 +104,7 @@ class FreeColumns {
       of.mean(friction(j) + 1) = mean_of(options_.viscous_Nms_rad, j);
       of.precision(friction(j), friction(j)) = precision;
       of.precision(friction(j) + 1, friction(j) + 1) = precision;
-      if (has_scale())
-        of.precision(scale(j), scale(j)) =
-            1.0 / (options_.torque_scale_share * options_.torque_scale_share);
+      if (has_scale()) of.precision(scale(j), scale(j)) = 1.0 / (scale_std(j) * scale_std(j));
     }
     return of;
   }
@@ -154,7 +165,7 @@ ArmFit fit_arm(const ArmModel& arm, const MomentumWindows& windows,
     joint.viscous_Nms_rad = parameter_of(of.fit, columns.friction(j) + 1, friction_std(arm, j));
     joint.scale = {.value = 1.0, .standard_error = 0.0, .is_determined = true};
     if (columns.has_scale()) {
-      joint.scale = parameter_of(of.fit, columns.scale(j), options.torque_scale_share);
+      joint.scale = parameter_of(of.fit, columns.scale(j), columns.scale_std(j));
       joint.scale.value += 1.0;
     }
     of.joints.push_back(std::move(joint));
@@ -169,6 +180,7 @@ ArmFit fit_arm(const ArmModel& arm, const MomentumWindows& windows,
 
 void require_possible(const IdentificationOptions& options, const ArmModel& arm) {
   check_share(options.torque_scale_share, "torque_scale_share", 0.5);
+  check_share(options.torque_floor_share, "torque_floor_share", 0.1);
   check_share(options.link_share, "link_share", 1.0);
   check_share(options.link_com_m, "link_com_m", 1.0);
   const auto check_time = [](double value, const char* name, double least, double largest) {

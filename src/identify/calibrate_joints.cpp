@@ -259,6 +259,7 @@ std::vector<CalibratedJoint> calibrate_joints(std::span<const CalibrationMotion>
     throw UsageError({.place = "calibrate_joints", .expected = "a recording", .found = "none"});
   const ArmSetup& first = motions.front().setup;
   std::vector<CalibratedJoint> joints;
+  joints.reserve(first.joints.size());
   for (std::size_t j = 0; j < first.joints.size(); ++j)
     joints.push_back({.name = first.arm.joints[j].name,
                       .actuator = full_name(first.joints[j].sheet),

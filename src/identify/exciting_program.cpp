@@ -129,6 +129,7 @@ class Planner {
   }
   std::vector<double> drawn() {
     std::vector<double> pose;
+    pose.reserve(setup_.arm.joints.size());
     for (const ArmJoint& joint : setup_.arm.joints) {
       const double middle = 0.5 * (joint.lowest_rad + joint.highest_rad);
       const double half = 0.5 * spec_.range_share * (joint.highest_rad - joint.lowest_rad);
@@ -289,6 +290,7 @@ ExcitingProgram exciting_program(const ArmSetup& setup, const ExcitationSpec& sp
 std::string program_yaml(const ArmProgram& program) {
   const auto list = [](const std::vector<double>& angles_rad) {
     std::vector<std::string> texts;
+    texts.reserve(angles_rad.size());
     for (const double angle : angles_rad)
       texts.push_back(fmt::format("{:.1f}deg", deg_from_rad(angle)));
     return fmt::format("[{}]", fmt::join(texts, ", "));

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,7 +32,7 @@ struct IdentifyFlags {
   std::string tilt;
   std::string window;
   std::string links_com;
-  double torque_within_percent = 1.0;
+  std::optional<double> torque_within_percent = {};
   double links_within_percent = 0.0;
   bool has_links = false;
   std::vector<std::string> tests;
@@ -42,6 +43,10 @@ struct IdentifyFlags {
 // Assumed of the links with `--links`.
 constexpr double kLinkShare = 0.1;
 constexpr double kLinkCom_m = 0.01;
+
+// How wrong the torque of a joint may be as a whole.
+constexpr double kLinearPercent = 3.0;
+constexpr double kLearnedPercent = 1.0;
 
 constexpr std::array kInertiaNames{"xx", "yy", "zz", "xy", "xz", "yz"};
 
@@ -62,18 +67,26 @@ std::vector<torsio::ArmMotion> motions_of(const std::vector<std::string>& files,
   return motions;
 }
 
+/// Whether the torque is that of the linear spring of the data sheet.
+bool has_linear_spring(const torsio::ArmJointSetup& joint) {
+  return joint.model.empty() && joint.monitor.empty();
+}
+
 torsio::IdentificationOptions options_of(const IdentifyFlags& flags,
                                          const torsio::ArmSetup& setup) {
-  torsio::IdentificationOptions options{.torque_scale_share = 0.01 * flags.torque_within_percent,
+  const bool has_linear = std::ranges::any_of(setup.joints, &has_linear_spring);
+  const double torque_percent =
+      flags.torque_within_percent.value_or(has_linear ? kLinearPercent : kLearnedPercent);
+  torsio::IdentificationOptions options{.torque_scale_share = 0.01 * torque_percent,
                                         .link_share = 0.01 * flags.links_within_percent};
   if (!flags.links_com.empty())
     options.link_com_m = torsio::si_quantity(flags.links_com, "m", "--links-com");
   if (!flags.window.empty()) options.window_s = torsio::si_quantity(flags.window, "s", "--window");
   // A model that was trained with a load cell contains the friction of the bearing.
   for (const torsio::ArmJointSetup& joint : setup.joints) {
-    const bool is_linear = joint.model.empty() && joint.monitor.empty();
-    options.dry_Nm.push_back(is_linear ? joint.sheet.joint.bearing_friction_Nm.value : 0.0);
-    options.viscous_Nms_rad.push_back(is_linear ? joint.sheet.joint.viscous_Nms_rad.value : 0.0);
+    options.dry_Nm.push_back(has_linear_spring(joint) ? joint.sheet.joint.bearing_friction_Nm.value : 0.0);
+    options.viscous_Nms_rad.push_back(has_linear_spring(joint) ? joint.sheet.joint.viscous_Nms_rad.value
+                                                       : 0.0);
   }
   return options;
 }
@@ -118,6 +131,7 @@ std::string payload_line(const torsio::BodyInertia& body) {
       body.mass_kg, 1e3 * body.com_m[0], 1e3 * body.com_m[1], 1e3 * body.com_m[2]);
   bool has_inertia = false;
   std::vector<std::string> inertia;
+  inertia.reserve(body.inertia_kg_m2.size());
   for (const double moment : body.inertia_kg_m2) {
     has_inertia = has_inertia || moment != 0.0;
     inertia.push_back(fmt::format("{:.5f}", moment));
@@ -295,9 +309,10 @@ void add_arm_identify(CLI::App& arm) {
   verb->add_option("--tilt", flags->tilt,
                    "tilt of the base about its y axis, in place of that of the arm's file: 30deg");
   verb->add_option("--window", flags->window, "length of the windows (default: 0.25s)");
-  verb->add_option("--torque-within", flags->torque_within_percent,
-                   "percent by which the torque of a joint may be wrong as a whole")
-      ->capture_default_str();
+  verb->add_option(
+      "--torque-within", flags->torque_within_percent,
+      "percent by which the torque of a joint may be wrong as a whole (default: 3 if a "
+      "joint of the arm's file has no model, else 1)");
   verb->add_option("--links-within", flags->links_within_percent,
                    "percent by which mass and inertia of each link may differ from the URDF file")
       ->capture_default_str();

@@ -16,8 +16,11 @@ struct IdentificationOptions {
   double window_s = 0.25;              ///< length of a window
   double speed_window_s = 0.03;        ///< angles whose regression slope is the speed
   double friction_speed_rad_s = 0.02;  ///< v₀ of the dry friction F tanh(q̇ / v₀)
-  /// Share by which each joint's torque may be wrong as a whole.
+  /// Share by which each joint's torque may be wrong as a whole; 0: exact.
   double torque_scale_share = 0.01;
+  /// The same as a share of the joint's largest torque (`ArmJoint::effort_Nm`), over the RMS of its torque in the motion: a small torque
+  /// is wrong by more, since friction within the spring carries it.
+  double torque_floor_share = 0.002;
   /// Share by which mass and inertia of each link may differ from the model's, and `link_com_m` by
   /// how much its centre of mass. Payload only: 0, the links are those of the model.
   double link_share = 0.0;
