@@ -115,16 +115,19 @@ std::vector<double> start_of(const Line& line) {
 ArmRun collide(const ArmCollision& collision) {
   const ArmSetup setup = collision_setup(collision.payload_kg);
   const Line line = line_of(setup, collision);
-  // The detector settles first.
-  ArmRunSpec spec{.program = {.start_rad = start_of(line),
-                              .steps = {{.task = ArmTask::hold, .duration_s = kRest_s},
-                                        {.task = ArmTask::follow,
-                                         .path_rad = line.path_rad,
-                                         .plate = line.plate}},
-                              .reaction = collision.reaction},
-                  .contacts = collision.contacts,
-                  .seed = collision.seed,
-                  .has_gear_stage = false};
+  ArmRunSpec spec{.program = {.start_rad = start_of(line)}};
+  spec.contacts = collision.contacts;
+  spec.seed = collision.seed;
+  spec.has_gear_stage = false;
+  spec.program.reaction = collision.reaction;
+  ArmStep rest;  // the detector settles
+  rest.duration_s = kRest_s;
+  spec.program.steps.push_back(rest);
+  ArmStep motion;
+  motion.task = ArmTask::follow;
+  motion.path_rad = line.path_rad;
+  motion.plate = line.plate;
+  spec.program.steps.push_back(motion);
   ArmRun run = run_arm(setup, spec);
   if (!run.impact)
     throw Error({.place = setup.arm.name,

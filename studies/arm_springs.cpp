@@ -22,7 +22,7 @@ namespace {
 constexpr double kBench_s = 50.0;  // each recording
 constexpr std::size_t kSerials = 99;
 // Torques over the rating: weight of the lever, amplitude of the chirp, root mean square of the noise.
-constexpr double kSweepShare = 0.5;
+constexpr double kLeverShare = 0.5;
 constexpr double kChirpShare = 0.8;
 constexpr double kNoiseShare = 0.3;
 constexpr double kFaintShare = 0.04;
@@ -32,7 +32,7 @@ Dataset bench_recordings(const std::string& actuator, std::uint64_t seed) {
   const double rated_Nm = sheet.rating.torque_Nm.value;
   // A sweep moves the joint: in a locked one every motion would be a jump of an encoder.
   const std::array specs{
-      ExperimentSpec{.experiment = "sweep", .lever_m = lever_m(sheet, kSweepShare)},
+      ExperimentSpec{.experiment = "sweep", .lever_m = lever_m(sheet, kLeverShare)},
       ExperimentSpec{.experiment = "chirp", .torque_amplitude_Nm = kChirpShare * rated_Nm},
       ExperimentSpec{.experiment = "random-walk", .torque_amplitude_Nm = kNoiseShare * rated_Nm},
       ExperimentSpec{.experiment = "random-walk", .torque_amplitude_Nm = kFaintShare * rated_Nm}};

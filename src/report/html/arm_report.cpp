@@ -15,6 +15,7 @@ namespace torsio {
 namespace {
 
 constexpr std::size_t kPosesDrawn = 6;
+constexpr double kContactMark_s = 0.05;
 
 /// Origins of base, links and flange in one pose.
 std::vector<Vector3> skeleton(const ArmDynamics& dynamics, std::span<const double> angle_rad) {
@@ -52,6 +53,46 @@ TimeFigure torques(const ArmRun& run) {
     add("estimated", CurveRole::model, "estimated_torque_Nm");
     add("external", CurveRole::limit, "external_torque_Nm");
   }
+  // Where contacts were found, and which of them are false alarms.
+  for (const ArmContact& contact : run.contacts)
+    builder.mark({.begin_s = contact.found_s,
+                  .end_s = contact.found_s + kContactMark_s,
+                  .label = fmt::format("contact in {}{}", contact.joint,
+                                       contact.latency_s ? "" : ", a false alarm"),
+                  .is_failure = !contact.latency_s});
+  return builder.finish();
+}
+
+TextTable contact_table(const ArmRun& run) {
+  TextTable table;
+  table.header({"found at [s]", "joint", "after [ms]", "reaction"});
+  for (const ArmContact& contact : run.contacts)
+    table.row({fmt::format("{:.3f}", contact.found_s), contact.joint,
+               contact.latency_s ? fmt::format("{:.0f}", 1e3 * *contact.latency_s)
+                                 : std::string("false alarm"),
+               std::string(name(contact.reaction))});
+  return table;
+}
+
+TextTable impact_table(const ArmImpact& impact) {
+  const auto force = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.0f}", *value) : std::string("-");
+  };
+  TextTable table;
+  table.header({"touched at [s]", "first peak [N]", "largest [N]", "later than 80 ms [N]",
+                "after 0.5 s [N]"});
+  table.row({fmt::format("{:.3f}", impact.touched_s), fmt::format("{:.0f}", impact.first_peak_N),
+             fmt::format("{:.0f}", impact.peak_N), force(impact.largest_late_N),
+             force(impact.rest_N)});
+  return table;
+}
+
+/// The force of a plate over time.
+TimeFigure plate_force(const ArmRun& run) {
+  TimeFigureBuilder builder("Force of the plate", run.record, 1, {},
+                            values_of_figure(run.record.size()));
+  builder.panel("force [N]");
+  builder.add("plate", CurveRole::measured, true, run.record.channel("plate_force_N").values);
   return builder.finish();
 }
 
@@ -98,6 +139,17 @@ ReportDocument arm_report(const ArmSetup& setup, const ArmRun& run,
                        .text = "Position, torque and external torque: RMSE to the true values."};
   scores.tables.push_back(report_table(arm_scores(run)));
   document.sections.push_back(std::move(scores));
+  if (!run.contacts.empty() || run.impact) {
+    ReportSection contacts{
+        .heading = "Contacts",
+        .text =
+            "Found where the external torque of a joint is above its threshold. The time after "
+            "a contact began, and the force of the plate, are those of the simulation."};
+    if (!run.contacts.empty()) contacts.tables.push_back(report_table(contact_table(run)));
+    if (run.impact) contacts.tables.push_back(report_table(impact_table(*run.impact)));
+    if (run.record.has("plate_force_N")) contacts.figures.emplace_back(plate_force(run));
+    document.sections.push_back(std::move(contacts));
+  }
 
   std::vector<std::vector<double>> poses;
   std::vector<std::string> labels;

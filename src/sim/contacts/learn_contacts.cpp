@@ -44,6 +44,7 @@ struct Part {
 
 struct Work {
   const ArmSetup& setup;
+  const ArmController::Settings& settings;
   const ContactLearning& learning;
   const std::vector<ExternalTorqueError>& errors;  ///< empty: samples for the fit
 };
@@ -65,7 +66,7 @@ Part move_freely(const Work& work, double duration_s, std::uint64_t seed,
                  const Progress& progress) {
   const std::size_t joints = work.setup.joints.size();
   ArmFreeMotion motion(
-      work.setup, arm_controller_settings(work.setup),
+      work.setup, work.settings,
       work.learning.has_gear_stage ? FirstStageForm::elastic : FirstStageForm::rigid, seed);
   Part part{.samples = std::vector<ExternalTorqueSamples>(joints),
             .maxima = std::vector<std::vector<double>>(joints),
@@ -167,19 +168,24 @@ double checked_rate(const ContactLearning& learning) {
 
 LearnedContacts learn_contacts(const ArmSetup& setup, const ContactLearning& learning,
                                const Progress& progress) {
+  return learn_contacts(setup, arm_controller_settings(setup), learning, progress);
+}
+
+LearnedContacts learn_contacts(const ArmSetup& setup, const ArmController::Settings& settings,
+                               const ContactLearning& learning, const Progress& progress) {
   const double rate = checked_rate(learning);
   const double duration_s = learning.hours * kHour_s;
   const double fit_s = std::max(kFitShare * duration_s, kShortestFit_s);
   const double fit_share = fit_s / (fit_s + duration_s);
   const std::vector<ExternalTorqueError> none;
   const std::vector<ExternalTorqueError> errors = fit_errors(
-      move_in_parts({setup, learning, none}, fit_s, 0, share_of(progress, 0, fit_share)));
-  const std::vector<Part> parts = move_in_parts({setup, learning, errors}, duration_s,
+      move_in_parts({setup, settings, learning, none}, fit_s, 0, share_of(progress, 0, fit_share)));
+  const std::vector<Part> parts = move_in_parts({setup, settings, learning, errors}, duration_s,
                                                 kThresholdSeeds, share_of(progress, fit_share, 1));
   LearnedContacts learned{
       .file = {.arm = setup.arm.name,
                .payload_kg = setup.arm.payload.mass_kg,
-               .bandwidth_rad_s = MomentumObserver::Settings().bandwidth_rad_s,
+               .bandwidth_rad_s = settings.observer.bandwidth_rad_s,
                .hours = learning.hours,
                .false_alarms_per_hour = rate,
                .upper_bound_per_hour = supported_rate_per_hour(learning.hours)}};

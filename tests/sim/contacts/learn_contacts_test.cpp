@@ -6,9 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "numerics/event_bounds.hpp"
-#include "sim/contacts/arm_free_motion.hpp"
+#include "sim/contacts/contact_trials.hpp"
 #include "support/error_message.hpp"
 
 namespace torsio {
@@ -45,34 +46,29 @@ TEST(LearnContacts, ItsErrorBarsAreRightOnOtherMotion) {
 
 // 30 per hour were wanted: in 6 minutes of other motion 3 are expected. 10 or more would have a probability of 0.1 %.
 TEST(LearnContacts, ItsRateOfFalseAlarmsHoldsOnOtherMotion) {
-  const ArmSetup setup = arm6_setup();
-  ArmFreeMotion motion(setup, with_contacts(), FirstStageForm::rigid, 91);
-  std::size_t alarms = 0;
-  bool was_found = false;
-  for (int tick = 0; tick < 360'000; ++tick) {
-    const ArmController::Output& output = motion.control();
-    if (output.contact.is_found && !was_found) ++alarms;
-    was_found = output.contact.is_found;
-    motion.act({});
-  }
+  const std::size_t alarms = count_false_alarms(arm6_setup(), with_contacts(), kLearnedHours, 91);
   RecordProperty("false_alarms", std::to_string(alarms));
   EXPECT_LT(alarms, 10U);
 }
 
-TEST(LearnContacts, FindsAPushOnTheFlange) {
+TEST(PushTrials, AreFoundAndCorrespondForASeed) {
   const ArmSetup setup = arm6_setup();
-  ArmFreeMotion motion(setup, with_contacts(), FirstStageForm::rigid, 17);
-  for (int tick = 0; tick < 1500; ++tick) {
-    EXPECT_FALSE(motion.control().contact.is_found) << tick;
-    motion.act({});
+  const PushTrials trials{.count = 10, .force_N = 100.0, .seed = 17};
+  const std::vector<PushTrial> done = push_trials(setup, with_contacts(), trials);
+  ASSERT_EQ(done.size(), 10U);
+  std::size_t above = 0;
+  std::size_t found = 0;
+  for (const PushTrial& trial : done) {
+    if (!trial.is_above) continue;
+    ++above;
+    if (trial.latency_s.value_or(1.0) <= 0.05) ++found;
   }
-  int latency = 0;
-  while (latency < 200 && !motion.control().contact.is_found) {
-    motion.act({.force_N = {0.0, 60.0, 60.0}});
-    ++latency;
-  }
-  RecordProperty("latency_ms", std::to_string(latency));
-  EXPECT_LT(latency, 60);
+  RecordProperty("above", std::to_string(above));
+  EXPECT_GE(above, 5U);
+  EXPECT_GE(found + 1, above);
+  const std::vector<PushTrial> again = push_trials(setup, with_contacts(), trials);
+  for (std::size_t k = 0; k < done.size(); ++k)
+    EXPECT_EQ(done[k].latency_s, again[k].latency_s) << k;
 }
 
 TEST(LearnContacts, RefusesARateThatTheHoursDoNotSupport) {

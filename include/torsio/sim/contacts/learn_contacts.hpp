@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "torsio/arm/arm_controller.hpp"
 #include "torsio/arm/contacts_file.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/sim/arm/arm_setup.hpp"
@@ -38,6 +39,11 @@ struct LearnedContacts {
 /// @throws UsageError if hours are below 0.02 or above 1000, or do not support the rate: without a false alarm in T hours
 /// the rate is below 3 / T with 95 % confidence and nothing lower is known. Error if the arm stops; Cancelled.
 [[nodiscard]] LearnedContacts learn_contacts(const ArmSetup& setup, const ContactLearning& learning,
+                                             const Progress& progress = {});
+/// The same with another controller than that of `arm_controller_settings`.
+[[nodiscard]] LearnedContacts learn_contacts(const ArmSetup& setup,
+                                             const ArmController::Settings& settings,
+                                             const ContactLearning& learning,
                                              const Progress& progress = {});
 
 }  // namespace torsio
