@@ -84,9 +84,10 @@ torsio::IdentificationOptions options_of(const IdentifyFlags& flags,
   if (!flags.window.empty()) options.window_s = torsio::si_quantity(flags.window, "s", "--window");
   // A model that was trained with a load cell contains the friction of the bearing.
   for (const torsio::ArmJointSetup& joint : setup.joints) {
-    options.dry_Nm.push_back(has_linear_spring(joint) ? joint.sheet.joint.bearing_friction_Nm.value : 0.0);
-    options.viscous_Nms_rad.push_back(has_linear_spring(joint) ? joint.sheet.joint.viscous_Nms_rad.value
-                                                       : 0.0);
+    options.dry_Nm.push_back(has_linear_spring(joint) ? joint.sheet.joint.bearing_friction_Nm.value
+                                                      : 0.0);
+    options.viscous_Nms_rad.push_back(
+        has_linear_spring(joint) ? joint.sheet.joint.viscous_Nms_rad.value : 0.0);
   }
   return options;
 }
@@ -175,7 +176,8 @@ IdentifyJson identified_json(const IdentifyFlags& flags, const torsio::Identifie
 /// A torque with the wrong sign, unit or joint fits no payload.
 constexpr double kPlausibleShare = 0.1;  // residual over the largest torque of a joint
 constexpr double kSurely = 3.0;          // standard errors
-constexpr double kSmallShare = 0.05;     // share of the mass of all links, by which linear springs may err
+constexpr double kSmallShare =
+    0.05;  // share of the mass of all links, by which linear springs may err
 
 /// @throws Error if the mass is negative
 void require_plausible(const torsio::ArmSetup& setup, const torsio::IdentifiedPayload& found) {
