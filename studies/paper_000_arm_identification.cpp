@@ -157,9 +157,10 @@ void identify_with(const BenchedArm& arm, const ArmRun& run, Random& random,
                    std::array<PayloadScores, kWays.size()>& scores, const BodyInertia& truth) {
   const ArmMotion linear = motion_of_models(run, arm.linear);
   const ArmMotion learned = motion_of_models(run, arm.learned);
-  scores[0].add(
-      identify_payload(arm.setup.arm, {&linear, 1}, {.torque_scale_share = kLinearScaleShare}),
-      truth);
+  scores[0].add(identify_payload(arm.setup.arm, {&linear, 1},
+                                 {.torque_scale_share = kLinearScaleShare,
+                                  .torque_floor_share = 0.2 * kLinearScaleShare}),
+                truth);
   scores[1].add(identify_payload(arm.setup.arm, {&learned, 1}), truth);
   const ArmModel wrong = with_link_errors(arm.setup.arm, random, 0.01, 0.002);
   scores[2].add(identify_payload(wrong, {&learned, 1}, {.link_share = 0.01, .link_com_m = 0.002}),

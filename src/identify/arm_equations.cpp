@@ -14,7 +14,7 @@ namespace {
 constexpr double kFrictionShare = 0.02;  // standard deviation of a friction, of the largest torque
 constexpr double kLeastInertiaShare =
     1e-3;  // share of the largest moment: a product of 0 may differ, too
-constexpr double kLargestScale = 1.0;
+constexpr double kLargestScale = 3.0;
 constexpr double kDeterminedFriction = 0.5;  // standard error over that of the prior
 
 double friction_std(const ArmModel& arm, std::size_t joint) {
@@ -37,8 +37,6 @@ class FreeColumns {
     }
     friction_ = size_;
     size_ += eigen_index(2 * windows.joints);
-    scale_ = size_;
-    if (has_scale()) size_ += eigen_index(windows.joints);
   }
 
   /// The standard deviation of the scale of a joint's torque.
@@ -53,17 +51,16 @@ class FreeColumns {
     return std::hypot(options_.torque_scale_share,
                       std::min(kLargestScale, rms_Nm > 0.0 ? floor_Nm / rms_Nm : kLargestScale));
   }
-  [[nodiscard]] bool has_scale() const { return options_.torque_scale_share > 0.0; }
   [[nodiscard]] const std::vector<std::optional<Eigen::Index>>& first() const { return first_; }
   [[nodiscard]] Eigen::Index friction(std::size_t joint) const {
     return friction_ + eigen_index(2 * joint);
   }
-  [[nodiscard]] Eigen::Index scale(std::size_t joint) const { return scale_ + eigen_index(joint); }
   [[nodiscard]] Eigen::Index size() const { return size_; }
 
   [[nodiscard]] JointEquations equations() const {
     JointEquations of{.columns = Eigen::MatrixXd::Zero(windows_.columns.rows(), size_),
                       .target = windows_.torque_Nm,
+                      .torque = windows_.torque_Nm,
                       .joints = windows_.joints,
                       .motion = windows_.motion};
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
@@ -75,12 +72,8 @@ class FreeColumns {
     }
     of.columns.middleCols(friction_, eigen_index(2 * windows_.joints)) =
         windows_.columns.rightCols(eigen_index(2 * windows_.joints));
-    if (!has_scale()) return of;
-    for (std::size_t w = 0; w < windows_.windows(); ++w)
-      for (std::size_t j = 0; j < windows_.joints; ++j) {
-        const Eigen::Index row = eigen_index(w * windows_.joints + j);
-        of.columns(row, scale(j)) = -windows_.torque_Nm(row);
-      }
+    if (options_.torque_scale_share > 0.0)
+      for (std::size_t j = 0; j < windows_.joints; ++j) of.scale_std.push_back(scale_std(j));
     return of;
   }
 
@@ -104,7 +97,6 @@ class FreeColumns {
       of.mean(friction(j) + 1) = mean_of(options_.viscous_Nms_rad, j);
       of.precision(friction(j), friction(j)) = precision;
       of.precision(friction(j) + 1, friction(j) + 1) = precision;
-      if (has_scale()) of.precision(scale(j), scale(j)) = 1.0 / (scale_std(j) * scale_std(j));
     }
     return of;
   }
@@ -116,7 +108,6 @@ class FreeColumns {
   const IdentificationOptions& options_;
   std::vector<std::optional<Eigen::Index>> first_;
   Eigen::Index friction_ = 0;
-  Eigen::Index scale_ = 0;
   Eigen::Index size_ = 0;
 };
 
@@ -163,11 +154,6 @@ ArmFit fit_arm(const ArmModel& arm, const MomentumWindows& windows,
     IdentifiedJoint joint{.name = arm.joints[j].name, .residual_Nm = of.fit.residual_rms[j]};
     joint.dry_Nm = parameter_of(of.fit, columns.friction(j), friction_std(arm, j));
     joint.viscous_Nms_rad = parameter_of(of.fit, columns.friction(j) + 1, friction_std(arm, j));
-    joint.scale = {.value = 1.0, .standard_error = 0.0, .is_determined = true};
-    if (columns.has_scale()) {
-      joint.scale = parameter_of(of.fit, columns.scale(j), columns.scale_std(j));
-      joint.scale.value += 1.0;
-    }
     of.joints.push_back(std::move(joint));
   }
   of.data = {.duration_s = windows.window_s * static_cast<double>(windows.windows()),

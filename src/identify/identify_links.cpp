@@ -114,7 +114,7 @@ std::vector<double> torque_residuals(const ArmModel& arm, std::span<const Identi
   for (std::size_t w = 0; w < windows.windows(); ++w)
     for (std::size_t j = 0; j < joints.size(); ++j) {
       const Eigen::Index row = eigen_index(w * joints.size() + j);
-      const double residual = needed(row) - joints[j].scale.value * windows.torque_Nm(row);
+      const double residual = needed(row) - windows.torque_Nm(row);
       squares[j] += residual * residual;
     }
   for (double& square : squares)

@@ -134,6 +134,21 @@ class FitOfWindows {
       fit.jackknife += (count - 1.0) / count * change * change.transpose();
       begin = end;
     }
+    const Eigen::MatrixXd information = fit.model;
+    for (std::size_t j = 0; j < equations_.scale_std.size(); ++j) {
+      const Eigen::VectorXd change = equations_.scale_std[j] * (information * moment_of_torque(j));
+      fit.jackknife += change * change.transpose();
+      fit.model += change * change.transpose();
+    }
+  }
+  /// Xᵀ W τ of the rows of one joint.
+  [[nodiscard]] Eigen::VectorXd moment_of_torque(std::size_t joint) const {
+    Eigen::VectorXd moment = Eigen::VectorXd::Zero(equations_.columns.cols());
+    for (std::size_t w = 0; w < windows_; ++w) {
+      const Eigen::Index row = eigen_index(w * equations_.joints + joint);
+      moment += equations_.torque(row) * equations_.columns.row(row).transpose();
+    }
+    return moment / (variance_[joint] * correlation_[joint]);
   }
 
   const JointEquations& equations_;

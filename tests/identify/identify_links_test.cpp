@@ -16,7 +16,8 @@ namespace {
 using test::MovingArm;
 using testing::HasSubstr;
 
-const IdentificationOptions kAssumed{.link_share = 0.1, .link_com_m = 0.01};
+const IdentificationOptions kAssumed{
+    .torque_scale_share = 0.0, .link_share = 0.1, .link_com_m = 0.01};
 
 /// The arm of a URDF file whose links differ from the real ones.
 ArmModel real_arm(std::uint64_t seed) {

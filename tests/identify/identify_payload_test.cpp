@@ -59,7 +59,8 @@ TEST(IdentifyPayload, HasStandardErrorsThatCoverTheTruth) {
   int all = 0;
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     const IdentifiedPayload found =
-        identified(loaded(kHandled), {.duration_s = 25.0, .noise_Nm = 0.3, .seed = seed});
+        identified(loaded(kHandled), {.duration_s = 25.0, .noise_Nm = 0.3, .seed = seed},
+                   {.torque_scale_share = 0.0});
     const auto count = [&](const IdentifiedQuantity& of, double truth) {
       const double errors = std::abs(of.value - truth) / of.standard_error;
       within += errors < 1.0 ? 1 : 0;
@@ -114,7 +115,8 @@ TEST(IdentifyPayload, ReportsAMassWithoutTorque) {
 }
 
 TEST(IdentifyPayload, FindsThatThereIsNone) {
-  const IdentifiedPayload found = identified(test::arm6(), {.noise_Nm = 0.05});
+  const IdentifiedPayload found =
+      identified(test::arm6(), {.noise_Nm = 0.05}, {.torque_scale_share = 0.0});
   EXPECT_NEAR(found.mass_kg.value, 0.0, 4.0 * found.mass_kg.standard_error);
   EXPECT_FALSE(found.com_m[0].is_determined);
   EXPECT_THAT(found.com_m[0].reason, HasSubstr("does not differ from 0"));
@@ -123,9 +125,10 @@ TEST(IdentifyPayload, FindsThatThereIsNone) {
 TEST(IdentifyPayload, TakesTheUncertaintyOfTheLinksIntoItsErrors) {
   const ArmModel arm = loaded(kHandled);
   const MovingArm::Options options{.noise_Nm = 0.02};
-  const IdentifiedPayload exact = identified(arm, options);
-  const IdentifiedPayload within =
-      identified(arm, options, {.link_share = 0.02, .link_com_m = 0.005});
+  const IdentifiedPayload exact = identified(arm, options, {.torque_scale_share = 0.0});
+  const IdentifiedPayload within = identified(
+      arm, options, {.torque_scale_share = 0.0, .link_share = 0.02, .link_com_m = 0.005});
+  EXPECT_GT(identified(arm, options).mass_kg.standard_error, exact.mass_kg.standard_error);
   EXPECT_GT(within.mass_kg.standard_error, exact.mass_kg.standard_error);
   EXPECT_GT(within.com_m[0].standard_error, exact.com_m[0].standard_error);
 }

@@ -146,7 +146,8 @@ void add_arm_calibrate(CLI::App& arm) {
       "Example: torsio arm calibrate front_0.csv=front_0.yaml side_30.csv=side_30.yaml -o joints/\n"
       "         torsio fit joints/joint2_*.csv --model grey_box -o joint2.safetensors\n"
       "Each file of the arm has the weight as its payload and the tilt of its base: two "
-      "attachments, one off the axis of the last joint, and two tilts determine all joints of "
+      "attachments, one off the axis of the last joint, and two tilts load all joints but the "
+      "first of "
       "arm6. docs/robot/arm_identification.md has the method.");
   verb->add_option(
           "RECORDING=ARM", flags->motions,

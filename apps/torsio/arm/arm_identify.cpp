@@ -78,6 +78,7 @@ torsio::IdentificationOptions options_of(const IdentifyFlags& flags,
   const double torque_percent =
       flags.torque_within_percent.value_or(has_linear ? kLinearPercent : kLearnedPercent);
   torsio::IdentificationOptions options{.torque_scale_share = 0.01 * torque_percent,
+                                        .torque_floor_share = 0.002 * torque_percent,
                                         .link_share = 0.01 * flags.links_within_percent};
   if (!flags.links_com.empty())
     options.link_com_m = torsio::si_quantity(flags.links_com, "m", "--links-com");
@@ -109,14 +110,13 @@ std::string payload_text(const torsio::IdentifiedPayload& found) {
     add_row(table, fmt::format("inertia, {}", kInertiaNames[i]), "kg m2", found.inertia_kg_m2[i],
             1.0, 4);
   torsio::TextTable joints;
-  joints.header({"joint", "residual [Nm]", "dry friction [Nm]", "viscous friction [Nms/rad]",
-                 "torque scale"});
+  joints.header({"joint", "residual [Nm]", "dry friction [Nm]", "viscous friction [Nms/rad]"});
   const auto with_error = [](const torsio::IdentifiedQuantity& of) {
     return fmt::format("{:.3f} +- {:.3f}", of.value, of.standard_error);
   };
   for (const torsio::IdentifiedJoint& joint : found.joints)
     joints.row({joint.name, fmt::format("{:.3f}", joint.residual_Nm), with_error(joint.dry_Nm),
-                with_error(joint.viscous_Nms_rad), with_error(joint.scale)});
+                with_error(joint.viscous_Nms_rad)});
   return fmt::format(
       "{}\n{}{} windows of {:g} s; standard errors from {} blocks of {:.3g} s; centre of mass and "
       "inertia in the frame of the flange, the inertia about the centre of mass\n",
@@ -168,8 +168,7 @@ IdentifyJson identified_json(const IdentifyFlags& flags, const torsio::Identifie
     document["joints"].push_back({{"joint", joint.name},
                                   {"residual_Nm", joint.residual_Nm},
                                   {"dry_Nm", quantity_json(joint.dry_Nm)},
-                                  {"viscous_Nms_rad", quantity_json(joint.viscous_Nms_rad)},
-                                  {"torque_scale", quantity_json(joint.scale)}});
+                                  {"viscous_Nms_rad", quantity_json(joint.viscous_Nms_rad)}});
   return document;
 }
 

@@ -20,7 +20,6 @@ struct IdentifiedJoint {
   std::string name = {};
   IdentifiedQuantity dry_Nm = {};           ///< dry friction of the bearing
   IdentifiedQuantity viscous_Nms_rad = {};  ///< viscous friction of the bearing
-  IdentifiedQuantity scale = {};            ///< true torque over the estimated one
   double residual_Nm = 0.0;                 ///< RMS of the residual, means over a window
 };
 

@@ -27,7 +27,7 @@ struct IdentifiedLink {
 struct IdentifiedLinks {
   std::vector<IdentifiedLink> links = {};
   std::vector<IdentifiedJoint> joints = {};
-  /// Friction and scale of the joints if the links are those of the model: for comparison.
+  /// Friction of the joints if the links are those of the model: for comparison.
   std::vector<IdentifiedJoint> modelled_joints = {};
   ArmModel arm = {};  ///< with the corrected links
   IdentificationData data = {};
@@ -43,7 +43,7 @@ struct IdentifiedLinks {
                                              const IdentificationOptions& options);
 
 /// How well the torques of other motions are those of an arm: RMS over the windows, one per joint [Nm], of the mean torque
-/// that the motion needs, less the estimated one with the friction and scale of `joints`.
+/// that the motion needs, less the estimated one with the friction of `joints`.
 /// @throws Error as `identify_payload`.
 [[nodiscard]] std::vector<double> torque_residuals(const ArmModel& arm,
                                                    std::span<const IdentifiedJoint> joints,

@@ -47,10 +47,10 @@ struct IdentifiedPayload {
 /// Mass, centre of mass and inertia of what an arm carries, from the torques of its joints. The
 /// momentum p = M(q) q̇ changes in a window from t₁ to t₂ by
 ///
-///     p(t₂) − p(t₁) = ∫ (τ + ∂T/∂q − g) dt,   τ = s τ_est − F tanh(q̇ / v₀) − d q̇
+///     p(t₂) − p(t₁) = ∫ (τ + ∂T/∂q − g) dt,   τ = τ_est − F tanh(q̇ / v₀) − d q̇
 ///
 /// which is linear in mass m, moment m c and inertia about the flange's origin, and in the nuisance
-/// parameters: scale s, dry and viscous friction of each joint, and the links' if they are not exact.
+/// parameters: dry and viscous friction of each joint, and the links' if they are not exact.
 /// No acceleration is needed; q̇ is the regression slope of 2 x 15 ms of angles, without delay.
 /// Least squares with the joints weighted by the variance of their residuals, and with the standard
 /// deviations of `IdentificationOptions` as prior; m, m c and the inertia have a prior of 50 kg, 20
