@@ -48,14 +48,15 @@ constexpr std::array kCoefficients{
     Coefficient{"p3", "Nm", 1.0, &DeflectionTorque::coulomb_Nm}};
 
 /// One of the two regressions of a joint.
-struct Source {
+struct TorqueSource {
   const char* name;
   DeflectionTorqueFit MotorReferencedFit::*fit;
   DeflectionTorque MotorReferencedTorques::Parameters::*parameters;
 };
 constexpr std::array kSources{
-    Source{"spring", &MotorReferencedFit::spring, &MotorReferencedTorques::Parameters::spring},
-    Source{"gear", &MotorReferencedFit::gear, &MotorReferencedTorques::Parameters::gear}};
+    TorqueSource{"spring", &MotorReferencedFit::spring,
+                 &MotorReferencedTorques::Parameters::spring},
+    TorqueSource{"gear", &MotorReferencedFit::gear, &MotorReferencedTorques::Parameters::gear}};
 
 /// Table 3. A coefficient that paper_figures.csv does not have ends the build.
 template <std::size_t... I>
