@@ -102,6 +102,12 @@ constexpr std::array kBenches{
     Bench{"torque_loop_grey_box_step", torque_loop_grey_box_step},
     Bench{"mailbox_read", mailbox_read},
     Bench{"recorder_push", recorder_push},
+    Bench{"link_encode", link_encode},
+    Bench{"link_encode_bytewise", link_encode_bytewise},
+    Bench{"link_encode_escapes", link_encode_escapes},
+    Bench{"link_decode", link_decode},
+    Bench{"link_decode_bytewise", link_decode_bytewise},
+    Bench{"link_decode_escapes", link_decode_escapes},
     Bench{"redundancy_step", redundancy_step},
     Bench{"monitor_step", monitor_step},
 };

@@ -21,8 +21,8 @@ using testing::IsEmpty;
 using test::file_bytes;
 using test::kRoot;
 
-constexpr const char* kStarts[] = {"runtime", "files",  "realtime", "data",   "learn",
-                                   "bench",   "trials", "report",   "design", "arm"};
+constexpr const char* kStarts[] = {"runtime", "files",  "realtime", "data", "learn", "bench",
+                                   "trials",  "report", "design",   "arm",  "link"};
 
 /// The public headers that a text includes, as "core/error.hpp".
 std::set<std::string> included(const std::string& text) {

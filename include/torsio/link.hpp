@@ -1,0 +1,6 @@
+#pragma once
+
+// Start here to reach a joint over a line of bytes, or to be reached: NDLCom frames over UDP, serial lines and more.
+
+#include "torsio/link/frame_counters.hpp"
+#include "torsio/link/ndlcom_frame.hpp"
