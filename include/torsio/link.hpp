@@ -4,4 +4,5 @@
 
 #include "torsio/link/command_guard.hpp"
 #include "torsio/link/frame_counters.hpp"
+#include "torsio/link/link_messages.hpp"
 #include "torsio/link/ndlcom_frame.hpp"

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/checks.hpp"
 #include "torsio/link/ndlcom_frame.hpp"
@@ -23,6 +24,14 @@ std::uint32_t command_checksum(LinkRoute route, std::span<const std::uint8_t> be
       route.receiver, route.sender, static_cast<std::uint8_t>(before.size() + kChecksumBytes)};
   const uLong crc = crc32_z(0, header.data(), header.size());
   return static_cast<std::uint32_t>(crc32_z(crc, before.data(), before.size()));
+}
+
+bool is_intact_command(LinkRoute route, std::span<const std::uint8_t> payload) noexcept {
+  if (payload.size() < kCommandBytes) return false;
+  const auto before = payload.first(payload.size() - kChecksumBytes);
+  std::uint32_t checksum = 0;
+  std::memcpy(&checksum, before.data() + before.size(), sizeof(checksum));
+  return checksum == command_checksum(route, before);
 }
 
 CommandGuard::CommandGuard(const Settings& settings) {
@@ -54,12 +63,14 @@ CommandGuard::Refusal CommandGuard::accept(const Command& command, std::uint64_t
   ++accepted_;
   host_ = command.route.sender;
   last_sequence_ = command.sequence;
-  const std::uint64_t until_ns = command.clock_ns + watchdog_ns_;
   // A host may have heard nothing new since its last command.
-  control_until_ns_ = std::max(control_until_ns_, until_ns);
-  // The deadline of the last reference holds, also where it is shorter than that of the one before.
-  if (command.is_motion) motion_until_ns_ = std::min(until_ns, command.deadline_ns);
+  control_until_ns_ = std::max(control_until_ns_, command.clock_ns + watchdog_ns_);
   return Refusal::none;
+}
+
+// The deadline of the last reference holds, also where it is shorter than that of the one before.
+void CommandGuard::extend(const Command& command) noexcept {
+  motion_until_ns_ = std::min(command.clock_ns + watchdog_ns_, command.deadline_ns);
 }
 
 bool CommandGuard::step(std::uint64_t now_ns) noexcept {

@@ -51,7 +51,7 @@ std::uint8_t* put_all_escaped(std::span<const std::uint8_t> from, std::uint8_t* 
     if (mask == 0) {
       at += size;
       to += size;
-    } else if ((mask & (mask - 1U)) == 0) {  // one, as it mostly is
+    } else if ((mask & (mask - 1U)) == 0) {  // one: the usual case
       const std::size_t plain = detail::first_of(mask);
       to[plain] = kEscape;
       std::memcpy(to + plain + 1, at + plain, kPlainBlock);

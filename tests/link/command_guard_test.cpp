@@ -28,8 +28,7 @@ CommandGuard::Command young_command(std::uint64_t sequence, std::uint64_t clock_
   return {.route = {.receiver = 3, .sender = host},
           .sequence = sequence,
           .clock_ns = clock_ns,
-          .is_intact = true,
-          .is_motion = true};
+          .is_intact = true};
 }
 
 TEST(CommandChecksum, IsThatOfEthernetOverHeaderAndPayload) {
@@ -105,10 +104,11 @@ TEST(CommandGuard, NothingIsExecutedAgainAfterARelease) {
 TEST(CommandGuard, AWatchedJointStopsWhenMotionCommandsRunOut) {
   CommandGuard guard({.watchdog_s = 0.05});
   EXPECT_EQ(guard.accept(young_command(1, kStart_ns), kStart_ns), Refusal::none);
+  guard.extend(young_command(1, kStart_ns));
   guard.watch(true);
-  auto read = young_command(2, kStart_ns + 40 * kMs);
-  read.is_motion = false;  // a write of a register does not keep a joint in motion
-  EXPECT_EQ(guard.accept(read, kStart_ns + 41 * kMs), Refusal::none);
+  // A write of a register does not keep a joint in motion.
+  EXPECT_EQ(guard.accept(young_command(2, kStart_ns + 40 * kMs), kStart_ns + 41 * kMs),
+            Refusal::none);
   EXPECT_FALSE(guard.step(kStart_ns + 50 * kMs - 1));
   EXPECT_TRUE(guard.step(kStart_ns + 50 * kMs));
   EXPECT_FALSE(guard.step(kStart_ns + 51 * kMs)) << "once";
@@ -118,10 +118,12 @@ TEST(CommandGuard, AWatchedJointStopsWhenMotionCommandsRunOut) {
 TEST(CommandGuard, TheDeadlineOfTheLastReferenceHolds) {
   CommandGuard guard({.watchdog_s = 0.05});
   EXPECT_EQ(guard.accept(young_command(1, kStart_ns), kStart_ns), Refusal::none);
+  guard.extend(young_command(1, kStart_ns));
   guard.watch(true);
   auto brief = young_command(2, kStart_ns + kMs);
   brief.deadline_ns = kStart_ns + 3 * kMs;
   EXPECT_EQ(guard.accept(brief, kStart_ns + kMs), Refusal::none);
+  guard.extend(brief);
   EXPECT_FALSE(guard.step(kStart_ns + 3 * kMs - 1));
   EXPECT_TRUE(guard.step(kStart_ns + 3 * kMs));
 }
@@ -130,6 +132,7 @@ TEST(CommandGuard, StopsWhereTheClockRunsBackwards) {
   CommandGuard guard({.watchdog_s = 0.05});
   EXPECT_FALSE(guard.step(kStart_ns));
   EXPECT_EQ(guard.accept(young_command(1, kStart_ns), kStart_ns), Refusal::none);
+  guard.extend(young_command(1, kStart_ns));
   guard.watch(true);
   EXPECT_TRUE(guard.step(kStart_ns - 1));
   EXPECT_EQ(guard.controlling_host(), 0);

@@ -25,6 +25,19 @@ struct LinkRoute {
 [[nodiscard]] std::uint32_t command_checksum(
     LinkRoute route, std::span<const std::uint8_t> before) noexcept TORSIO_REALTIME;
 
+/// What every command carries against repetition and delay.
+struct CommandSeal {
+  std::uint64_t sequence = 0;  ///< from 1 on, rising with each command of a host
+  std::uint64_t clock_ns = 0;  ///< the joint's clock as the host last heard it
+};
+
+/// Bytes of a command without fields: id, version, seal and CRC-32.
+inline constexpr std::size_t kCommandBytes = 2 + 16 + 4;
+
+/// Whether a payload is long enough for a command, and its last four bytes are the `command_checksum` of the others.
+[[nodiscard]] bool is_intact_command(
+    LinkRoute route, std::span<const std::uint8_t> payload) noexcept TORSIO_REALTIME;
+
 /// Decides which commands a joint executes: each once, in order, young, and from one host.
 ///
 ///     accepted if   checksum, own address, t_heard <= now < t_heard + T, t_heard >= end of the last control,
@@ -32,8 +45,8 @@ struct LinkRoute {
 ///
 /// with t_heard the joint's clock as the host last heard it, which the command carries, and T the time of the watchdog.
 /// Hosts need no clock of their own: what a command is late by the clock of the joint contains the way in both
-/// directions. A host takes control with its first accepted command and loses it by `release`, or T after the t_heard
-/// of its last one.
+/// directions. A host takes control with its first accepted command. It loses control by `release`, or when its youngest
+/// t_heard is T ago.
 ///
 /// The joint's clock must be monotonic and must not repeat after a restart of the joint: use the machine's (`MonotonicClock`),
 /// or let it begin at a random number of more than 40 bits. Else a command from before the restart could be young again.
@@ -62,10 +75,8 @@ class CommandGuard {
     std::uint64_t sequence = 0;  ///< from 1 on
     std::uint64_t clock_ns = 0;  ///< t_heard
     bool is_intact = false;      ///< its checksum is that of `command_checksum`
-    /// A reference, an enable or a heartbeat: it extends the time for which the joint may move.
-    bool is_motion = false;
     std::uint64_t deadline_ns =
-        std::numeric_limits<std::uint64_t>::max();  ///< of the joint's clock
+        std::numeric_limits<std::uint64_t>::max();  ///< by the joint's clock
   };
 
   /// @throws Error if the watchdog's time is out of its range.
@@ -74,6 +85,10 @@ class CommandGuard {
   /// @returns `none`: execute it now
   [[nodiscard]] Refusal accept(const Command& command,
                                std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+
+  /// The accepted command was a valid reference, an enable or a heartbeat: the joint may move until `clock_ns` + T, or until
+  /// the command's deadline. No other command feeds the watchdog.
+  void extend(const Command& command) noexcept TORSIO_REALTIME;
 
   /// Call before commands of this time are accepted. Ends the control of a host that is silent. @returns whether the
   /// motion commands have run out since the last call, or the clock has run backwards: stop.

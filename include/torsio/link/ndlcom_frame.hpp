@@ -27,7 +27,7 @@ inline constexpr std::size_t kNdlcomMaxEncodedBytes = 2 + 2 * kNdlcomMaxDecodedB
 struct NdlcomFrame {
   std::uint8_t receiver = kNdlcomReserved;
   std::uint8_t sender = kNdlcomReserved;
-  std::uint8_t counter = 0;  ///< of the sender for this receiver; wraps after 255
+  std::uint8_t counter = 0;  ///< per receiver at the sender; wraps after 255
   std::span<const std::uint8_t> payload = {};
 };
 
@@ -104,7 +104,7 @@ class NdlcomDecoder {
   NdlcomRules rules_;
   Phase phase_ = Phase::searching;
   bool has_discarded_ = false;  ///< while searching: at least one byte
-  std::size_t size_ = 0;        ///< of the frame so far
+  std::size_t size_ = 0;        ///< bytes so far
   Counts counts_ = {};
   std::array<std::uint8_t, kCopied + kNdlcomMaxDecodedBytes + kCopied> buffer_ = {};
 };
