@@ -48,6 +48,12 @@ struct LinkValue {
     return of(std::string_view(value));
   }
 
+  /// For a value whose type is known to be that of the variable.
+  void copy_to(bool& variable) const noexcept { variable = boolean; }
+  void copy_to(std::int32_t& variable) const noexcept { variable = int32; }
+  void copy_to(std::uint32_t& variable) const noexcept { variable = uint32; }
+  void copy_to(double& variable) const noexcept { variable = float64; }
+
   /// Numbers are compared bit by bit, so that NaN is equal to itself.
   [[nodiscard]] bool operator==(const LinkValue& other) const noexcept;
 };
