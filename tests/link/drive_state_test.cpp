@@ -62,7 +62,6 @@ TEST(DriveState, AFaultIsStrongerThanAStopAndResetWhenItsCauseHasEnded) {
   EXPECT_TRUE(drive.stop(LinkStateReason::requested));
   EXPECT_TRUE(drive.fault());
   EXPECT_FALSE(drive.fault());
-  EXPECT_FALSE(drive.stop(LinkStateReason::requested));
   EXPECT_EQ(drive.reason(), LinkStateReason::joint_fault);
   EXPECT_EQ(drive.request(Wanted::disable, true, false), LinkRefusal::not_in_this_state);
   EXPECT_EQ(drive.request(Wanted::reset_fault, true, true), LinkRefusal::not_in_this_state);
