@@ -15,5 +15,6 @@
 #include "torsio/link/joint_endpoint.hpp"
 #include "torsio/link/line_budget.hpp"
 #include "torsio/link/link_messages.hpp"
+#include "torsio/link/link_transport.hpp"
 #include "torsio/link/ndlcom_frame.hpp"
 #include "torsio/link/register_table.hpp"

@@ -63,7 +63,8 @@ JointEndpoint::JointEndpoint(const Settings& settings, LinkJoint& joint,
   require(settings.id != kNdlcomReserved && settings.id != kNdlcomBroadcast, kJointPlace,
           "an id of 1 to 254", fmt::format("{}", settings.id));
   require_positive(kJointPlace, "the rate of the ticks", settings.tick_rate_Hz);
-  require(settings.line_B_s > 0.0, kJointPlace, "a line with more than 0 bytes per second", settings.line_B_s);
+  require(settings.line_B_s > 0.0, kJointPlace, "a line with more than 0 bytes per second",
+          settings.line_B_s);
   require(joint.channels().size() <= kLinkChannels, kJointPlace,
           fmt::format("at most {} channels", kLinkChannels),
           fmt::format("{}", joint.channels().size()));
