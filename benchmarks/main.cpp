@@ -108,6 +108,7 @@ constexpr std::array kBenches{
     Bench{"link_decode", link_decode},
     Bench{"link_decode_bytewise", link_decode_bytewise},
     Bench{"link_decode_escapes", link_decode_escapes},
+    Bench{"link_round_trip", link_round_trip},
     Bench{"redundancy_step", redundancy_step},
     Bench{"monitor_step", monitor_step},
 };

@@ -80,6 +80,7 @@ Row link_encode_escapes();
 Row link_decode();
 Row link_decode_bytewise();
 Row link_decode_escapes();
+Row link_round_trip();
 Row redundancy_step();
 Row monitor_step();
 

@@ -64,7 +64,7 @@ struct UdpSettings {
 
 /// Datagrams between two sockets of the file system, which only this user can open.
 struct UnixSettings {
-  std::string path = {};  ///< of this side; at most 107 bytes
+  std::string path = {};  ///< this side's; at most 107 bytes
   std::string peer = {};
 };
 /// @throws Error if a path is too long, its folder cannot be written, or another process listens there
