@@ -93,6 +93,15 @@ TEST(CommandGuard, LetsOneHostControlUntilItReleasesOrIsSilent) {
             Refusal::none);
 }
 
+TEST(CommandGuard, ACommandWithAnOlderClockDoesNotShortenTheControl) {
+  CommandGuard guard({.watchdog_s = 0.05});
+  EXPECT_EQ(guard.accept(young_command(1, kStart_ns + 40 * kMs), kStart_ns + 40 * kMs),
+            Refusal::none);
+  EXPECT_EQ(guard.accept(young_command(2, kStart_ns), kStart_ns + 41 * kMs), Refusal::none);
+  EXPECT_FALSE(guard.step(kStart_ns + 89 * kMs));
+  EXPECT_EQ(guard.controlling_host(), 7);
+}
+
 TEST(CommandGuard, NothingIsExecutedAgainAfterARelease) {
   CommandGuard guard({.watchdog_s = 0.05});
   EXPECT_EQ(guard.accept(young_command(5, kStart_ns), kStart_ns), Refusal::none);
