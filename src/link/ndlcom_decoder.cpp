@@ -77,7 +77,7 @@ std::optional<NdlcomFrame> NdlcomDecoder::checked() noexcept {
 /// At a flag that ends a frame, and may begin the next.
 std::optional<NdlcomFrame> NdlcomDecoder::finish() noexcept {
   if (size_ == 0) return std::nullopt;  // two flags in a row
-  if (size_ < kNdlcomHeaderBytes + 2 || size_ != kNdlcomHeaderBytes + 2U + frame()[3]) {
+  if (size_ != kNdlcomHeaderBytes + 2U + frame()[3]) {
     ++counts_.malformed;
     size_ = 0;
     return std::nullopt;

@@ -39,15 +39,14 @@ std::uint8_t* put_escaped(std::uint8_t byte, std::uint8_t* to) noexcept {
   return to + 1;
 }
 
-/// After `from` 16 bytes can be read, and `to` has space for two bytes per byte and 16 more.
+/// After `from` there are 16 zeros, and `to` has space for two bytes per byte and 16 more.
 std::uint8_t* put_all_escaped(std::span<const std::uint8_t> from, std::uint8_t* to) noexcept {
   const std::uint8_t* at = from.data();
   const std::uint8_t* const end = at + from.size();
   while (at < end) {
-    unsigned mask = detail::copy_block(at, to);
+    const unsigned mask = detail::copy_block(at, to);
     const auto left = static_cast<std::size_t>(end - at);
     const std::size_t size = left < kPlainBlock ? left : kPlainBlock;
-    mask &= (1U << size) - 1U;
     if (mask == 0) {
       at += size;
       to += size;

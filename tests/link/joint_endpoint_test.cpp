@@ -5,6 +5,7 @@
 #include <zlib.h>
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -81,8 +82,7 @@ TEST_F(AJointOnALine, HasRegistersThatAreReadDescribedAndWritten) {
 TEST_F(AJointOnALine, ExecutesReferencesOnlyWhenItIsEnabled) {
   EXPECT_EQ(line_.command(host_, line_.reference(5.0F)), LinkRefusal::not_in_this_state);
   enable();
-  EXPECT_EQ(line_.command(host_, line_.reference(5.0F)), LinkRefusal::none);
-  EXPECT_EQ(line_.replies, 0U) << "a reference is not confirmed";
+  EXPECT_EQ(line_.command(host_, line_.reference(5.0F)), std::nullopt);
   ASSERT_EQ(line_.joint.references.size(), 1U);
   EXPECT_EQ(line_.joint.references[0].torque_Nm, 5.0);
   EXPECT_EQ(line_.command(host_, line_.reference(51.0F)), LinkRefusal::out_of_range);
@@ -95,7 +95,7 @@ TEST_F(AJointOnALine, ExecutesReferencesOnlyWhenItIsEnabled) {
 TEST_F(AJointOnALine, StopsWithinTheTimeOfTheWatchdogWhenItsHostIsSilent) {
   enable();
   for (int n = 0; n < 200; ++n) {
-    ASSERT_EQ(line_.command(host_, line_.reference(5.0F)), LinkRefusal::none) << n;
+    ASSERT_EQ(line_.command(host_, line_.reference(5.0F)), std::nullopt) << n;
     line_.tick();
   }
   line_.tick(38);
@@ -122,7 +122,7 @@ TEST_F(AJointOnALine, ReferencesThatAreRefusedDoNotFeedTheWatchdog) {
 TEST_F(AJointOnALine, HeartbeatsKeepItEnabled) {
   enable();
   for (int n = 0; n < 300; ++n) {
-    ASSERT_EQ(line_.change(host_, LinkStateCommand::heartbeat), LinkRefusal::none);
+    ASSERT_EQ(line_.change(host_, LinkStateCommand::heartbeat), std::nullopt);
     line_.tick();
   }
   EXPECT_TRUE(line_.endpoint.drive().is_enabled());
@@ -130,10 +130,12 @@ TEST_F(AJointOnALine, HeartbeatsKeepItEnabled) {
 
 TEST_F(AJointOnALine, IsControlledByOneHost) {
   enable();
-  EXPECT_EQ(line_.command(other_, line_.reference(5.0F)), LinkRefusal::none) << "no reply";
-  EXPECT_EQ(line_.replies, 0U);
+  EXPECT_EQ(line_.command(other_, line_.reference(5.0F)), std::nullopt);
+  EXPECT_EQ(line_.command(other_, LinkRegisterWrite{.index = 0, .value = LinkValue::of(1.0)}),
+            std::nullopt);
+  EXPECT_EQ(line_.gain, 2.0);
   EXPECT_THAT(line_.joint.references, IsEmpty());
-  EXPECT_EQ(line_.endpoint.guard().refused(CommandGuard::Refusal::other_host), 1U);
+  EXPECT_EQ(line_.endpoint.guard().refused(CommandGuard::Refusal::other_host), 2U);
   EXPECT_EQ(line_.change(host_, LinkStateCommand::release), LinkRefusal::none);
   EXPECT_EQ(line_.endpoint.drive().reason(), LinkStateReason::host_released);
   line_.tick();
@@ -240,6 +242,24 @@ TEST_F(AJointOnALine, SendsTelemetryAtTheRateAndForTheTimeOfASubscription) {
   EXPECT_EQ(host_.clock_ns(), rows.back().time_ns);
 }
 
+TEST_F(AJointOnALine, ContinuesTheTelemetryOfASubscriptionThatIsRenewed) {
+  const LinkSubscribe subscribe{.mask = 1, .rate_Hz = 500.0F, .lifetime_s = 0.01F};
+  std::vector<std::uint32_t> sequences;
+  for (int n = 0; n < 40; ++n) {
+    if (n % 5 == 0) {
+      EXPECT_EQ(line_.ask<LinkSubscription>(host_, subscribe)->refusal, LinkRefusal::none);
+    }
+    line_.tick();
+    if (const auto row = line_.received<LinkTelemetry>(host_)) sequences.push_back(row->sequence);
+  }
+  ASSERT_EQ(sequences.size(), 20U);
+  for (std::uint32_t n = 0; n < sequences.size(); ++n) EXPECT_EQ(sequences[n], n);
+  EXPECT_EQ(line_.ask<LinkSubscription>(host_, LinkSubscribe{.mask = 0})->refusal,
+            LinkRefusal::none);
+  line_.tick(3);
+  EXPECT_FALSE(line_.received<LinkTelemetry>(host_));
+}
+
 TEST_F(AJointOnALine, RefusesASubscriptionThatItCannotServe) {
   const auto refusal = [&](HostEndpoint& host, const LinkSubscribe& message) {
     return line_.ask<LinkSubscription>(host, message)->refusal;
@@ -288,7 +308,7 @@ TEST(JointEndpoint, CountsFramesThatTheLineDoesNotTake) {
 TEST_F(AJointOnALine, TakesAModelInPartsAndUsesItOnceItIsComplete) {
   std::string file(500, 'm');
   file[3] = '\x7E';
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(file.data());
+  const std::uint8_t* bytes = reinterpret_cast<const std::uint8_t*>(file.data());
   const auto crc = static_cast<std::uint32_t>(crc32_z(0, bytes, file.size()));
   const LinkUploadBegin begin{.size = 500, .crc = crc, .actuator = "dfki-50"};
   const auto chunk = [&](std::uint32_t offset, std::size_t size) {
@@ -320,6 +340,15 @@ TEST_F(AJointOnALine, TakesAModelInPartsAndUsesItOnceItIsComplete) {
   EXPECT_EQ(chunk(0, 200), LinkRefusal::none);
   EXPECT_EQ(ask(LinkUploadCommit{.crc = crc}).refusal, LinkRefusal::upload_rejected)
       << "another file";
+  EXPECT_EQ(ask(begin).refusal, LinkRefusal::none);
+  EXPECT_EQ(chunk(0, 200), LinkRefusal::none);
+  EXPECT_EQ(chunk(200, 200), LinkRefusal::none);
+  EXPECT_EQ(chunk(400, 0), LinkRefusal::upload_out_of_order);
+  file.resize(700, 'n');
+  bytes = reinterpret_cast<const std::uint8_t*>(file.data());
+  EXPECT_EQ(chunk(400, 101), LinkRefusal::upload_out_of_order) << "more than was announced";
+  EXPECT_EQ(chunk(400, 100), LinkRefusal::none);
+  EXPECT_EQ(ask(LinkUploadCommit{.crc = crc + 1}).state, LinkUploadState::rejected);
   EXPECT_EQ(ask(LinkUploadAbort{}).state, LinkUploadState::idle);
 }
 

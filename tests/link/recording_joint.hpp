@@ -117,9 +117,7 @@ class LinkedJoint {
   template <class Reply>
   std::optional<Reply> received(HostEndpoint& host) {
     std::optional<Reply> reply;
-    replies = 0;
     host.receive(sent.take(), [&]<class Message>(const Message& message) {
-      ++replies;
       if constexpr (std::is_same_v<Message, Reply>)
         if (!reply) reply = message;
     });
@@ -128,14 +126,21 @@ class LinkedJoint {
   void ping(HostEndpoint& host) {
     static_cast<void>(ask<LinkPong>(host, LinkPing{.token = ++token}));
   }
-  /// With the clock of now.
+  /// With the clock of now. @returns what the joint replies: done, or why not; none without a reply
   template <class Message>
-  LinkRefusal command(HostEndpoint& host, const Message& message) {
+  std::optional<LinkRefusal> command(HostEndpoint& host, const Message& message) {
     ping(host);
-    const auto refused = ask<LinkRefused>(host, message);
-    return refused ? refused->reason : LinkRefusal::none;
+    LinkBytes frame(kNdlcomMaxEncodedBytes);
+    frame.resize(host.build(message, frame));
+    endpoint.receive(frame, now_ns);
+    std::optional<LinkRefusal> reply;
+    host.receive(sent.take(), [&]<class Reply>(const Reply& received) {
+      if constexpr (std::is_same_v<Reply, LinkDone>) reply = LinkRefusal::none;
+      if constexpr (std::is_same_v<Reply, LinkRefused>) reply = received.reason;
+    });
+    return reply;
   }
-  LinkRefusal change(HostEndpoint& host, LinkStateCommand wanted) {
+  std::optional<LinkRefusal> change(HostEndpoint& host, LinkStateCommand wanted) {
     return command(host, LinkStateChange{.command = wanted});
   }
   LinkReference reference(float torque_Nm, std::uint64_t lasts_ns = 40'000'000) const {
@@ -157,7 +162,6 @@ class LinkedJoint {
   StoredFrames sent = {};
   std::uint64_t now_ns = kStart_ns;
   std::uint32_t token = 0;
-  std::size_t replies = 0;  ///< in the last exchange
   JointEndpoint endpoint;
 };
 
