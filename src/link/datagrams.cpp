@@ -7,6 +7,7 @@
 #include <sys/un.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 
@@ -36,9 +37,9 @@ const sockaddr* as_general(const sockaddr_un& address) noexcept {
 }
 
 std::string address_text(const sockaddr_in& address) {
-  char text[INET_ADDRSTRLEN] = {};
-  ::inet_ntop(AF_INET, &address.sin_addr, text, sizeof(text));
-  return fmt::format("{}:{}", text, ntohs(address.sin_port));
+  std::array<char, INET_ADDRSTRLEN> text{};
+  ::inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size());
+  return fmt::format("{}:{}", text.data(), ntohs(address.sin_port));
 }
 
 Descriptor datagram_socket(int family, const std::string& place) {

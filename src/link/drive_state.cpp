@@ -11,7 +11,7 @@ void DriveState::initialised() noexcept {
 
 LinkRefusal DriveState::request(LinkStateCommand command, bool is_at_rest,
                                 bool has_fault) noexcept {
-  LinkDriveState next = state_;
+  LinkDriveState next = LinkDriveState::ready;
   switch (command) {
     case LinkStateCommand::heartbeat:
     case LinkStateCommand::release: return LinkRefusal::none;
@@ -23,7 +23,6 @@ LinkRefusal DriveState::request(LinkStateCommand command, bool is_at_rest,
       if (state_ == LinkDriveState::ready) return LinkRefusal::none;
       if (state_ != LinkDriveState::enabled && !(state_ == LinkDriveState::stop && is_at_rest))
         return LinkRefusal::not_in_this_state;
-      next = LinkDriveState::ready;
       break;
     case LinkStateCommand::reset_fault:
       if (state_ != LinkDriveState::fault || has_fault) return LinkRefusal::not_in_this_state;

@@ -55,9 +55,9 @@ LinkRefusal JointEndpoint::subscribe(const LinkSubscribe& message, Context& cont
   reply.available_B_s = static_cast<float>(verdict.available_B_s);
   if (!verdict.fits) return LinkRefusal::line_too_slow;
   if (place == nullptr) {
-    const auto free = std::ranges::find(subscribers_, kNdlcomReserved, &Subscriber::host);
+    auto* const free = std::ranges::find(subscribers_, kNdlcomReserved, &Subscriber::host);
     if (free == subscribers_.end()) return LinkRefusal::too_many_subscribers;
-    place = &*free;
+    place = free;
   }
   const bool is_renewed = place->mask == message.mask && place->period_ticks == period_ticks;
   const std::uint32_t sequence = is_renewed ? place->sequence : 0;

@@ -112,7 +112,7 @@ __attribute__((target("pclmul,sse2"))) std::uint32_t folded_crc(const std::uint8
   return crc_of_blocks(rest.data(), 1, 0);
 }
 
-const bool kHasClmul = __builtin_cpu_supports("pclmul") != 0;
+const auto kHasClmul = static_cast<bool>(__builtin_cpu_supports("pclmul"));
 
 #endif
 

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <utility>
 
 #include "core/checks.hpp"
 #include "link/descriptor.hpp"
@@ -62,8 +63,10 @@ class ByteLine : public LinkTransport {
  protected:
   virtual bool may_send(std::size_t /*bytes*/) noexcept { return true; }
 
-  detail::Descriptor line_;
-  double baud_ = 0.0;
+  void use(detail::Descriptor line, double baud) noexcept {
+    line_ = std::move(line);
+    baud_ = baud;
+  }
 
  private:
   void flush() noexcept {
@@ -77,15 +80,16 @@ class ByteLine : public LinkTransport {
 
   std::array<std::uint8_t, kNdlcomMaxEncodedBytes> rest_ = {};
   std::span<const std::uint8_t> left_ = {};
+  detail::Descriptor line_;
+  double baud_ = 0.0;
 };
 
 class SerialLine : public ByteLine {
  public:
   explicit SerialLine(const SerialSettings& settings) : device_(settings.device) {
     const std::uint32_t baud = checked_baud(device_, settings.baud);
-    baud_ = settings.baud;
-    line_ = detail::Descriptor(::open(device_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-    if (!line_.is_open()) {
+    detail::Descriptor line(::open(device_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+    if (!line.is_open()) {
       const int error_number = errno;
       detail::refuse_system(
           device_, "cannot open", error_number,
@@ -93,10 +97,11 @@ class SerialLine : public ByteLine {
           : error_number == EBUSY ? "Another process has it for itself: end that process."
                                   : "Is the adapter connected? `ls /dev/tty*` lists the devices.");
     }
-    detail::set_raw(line_.number(), baud, device_);
+    detail::set_raw(line.number(), baud, device_);
     // From now on no other process can open it.
-    if (::ioctl(line_.number(), TIOCEXCL) != 0)
+    if (::ioctl(line.number(), TIOCEXCL) != 0)
       detail::refuse_system(device_, "cannot be reserved", errno);
+    use(std::move(line), settings.baud);
   }
   std::string place() const override { return device_; }
 
@@ -108,13 +113,13 @@ class PseudoTerminal : public ByteLine {
  public:
   explicit PseudoTerminal(const PseudoTerminalSettings& settings)
       : pace_(serial_B_s(checked_baud("pseudo-terminal", settings.baud)), kBufferedBytes) {
-    baud_ = settings.baud;
-    line_ = detail::Descriptor(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+    detail::Descriptor line(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
     std::array<char, 64> name{};
-    if (!line_.is_open() || ::grantpt(line_.number()) != 0 || ::unlockpt(line_.number()) != 0 ||
-        ::ptsname_r(line_.number(), name.data(), name.size()) != 0)
+    if (!line.is_open() || ::grantpt(line.number()) != 0 || ::unlockpt(line.number()) != 0 ||
+        ::ptsname_r(line.number(), name.data(), name.size()) != 0)
       detail::refuse_system("pseudo-terminal", "none can be made", errno);
     device_ = name.data();
+    use(std::move(line), settings.baud);
     // Open on this side too: else bytes are lost, and reads fail, while no program has it open.
     other_side_ = detail::Descriptor(::open(device_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
     if (!other_side_.is_open()) detail::refuse_system(device_, "cannot open", errno);

@@ -143,6 +143,12 @@ TEST_F(AJointOnALine, IsControlledByOneHost) {
   EXPECT_EQ(line_.change(other_, LinkStateCommand::enable), LinkRefusal::none);
 }
 
+TEST_F(AJointOnALine, IsNotStoppedByAReleaseWhileItIsDisabled) {
+  EXPECT_EQ(line_.change(host_, LinkStateCommand::release), LinkRefusal::none);
+  EXPECT_EQ(line_.endpoint.drive().state(), LinkDriveState::ready);
+  EXPECT_THAT(line_.joint.stops, IsEmpty());
+}
+
 TEST_F(AJointOnALine, StopsAtAnyTimeForAnyHost) {
   enable();
   EXPECT_EQ(line_.ask<LinkState>(other_, LinkStop{.category = 2})->state, LinkDriveState::stop);
@@ -167,7 +173,7 @@ TEST_F(AJointOnALine, OfABroadcastExecutesOnlyAStop) {
   EXPECT_EQ(line_.endpoint.counts().broadcasts, 1U);
   LinkBytes frame(kNdlcomMaxEncodedBytes);
   frame.resize(other_.build_stop_of_all(1, frame));
-  line_.endpoint.receive(frame, line_.now_ns);
+  EXPECT_FALSE(line_.deliver<LinkState>(other_, frame)) << "all joints would reply at once";
   EXPECT_EQ(line_.endpoint.drive().state(), LinkDriveState::stop);
 }
 

@@ -155,6 +155,16 @@ TEST(LinkMessages, TextsAreCutOffAndNothingIsWrittenThatDoesNotFit) {
   EXPECT_EQ(encode_payload(LinkUploadChunk{.data = large}, {}, out), 0U);
 }
 
+TEST(LinkMessages, WithATextThatIsTooLongAreRefused) {
+  for (const std::uint8_t size : {std::uint8_t{48}, std::uint8_t{49}}) {
+    LinkBytes payload{LinkChannelDescription::kId, 1, 0, 1, size};
+    payload.resize(payload.size() + size, 'x');
+    LinkChannelDescription decoded;
+    EXPECT_EQ(decode_payload(payload, decoded),
+              size == 48 ? LinkRefusal::none : LinkRefusal::wrong_length);
+  }
+}
+
 TEST(LinkMessages, WithstandRandomBytes) {
   Random random(8);
   for (int n = 0; n < 200000; ++n) {

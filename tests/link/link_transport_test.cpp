@@ -242,6 +242,30 @@ TEST(PseudoTerminal, SendsNoFasterThanItsRateAndCompletesFrames) {
   EXPECT_EQ(all.size(), taken);
 }
 
+TEST(SerialLine, NeverSendsPartOfAFrameOnly) {
+  const auto joint = open_pseudo_terminal({.baud = 8e6});
+  const auto host = open_serial({.device = joint->place(), .baud = 8e6});
+  LinkBytes expected;
+  LinkBytes arrived;
+  LinkBytes part(100);
+  for (int round = 0; round < 50; ++round) {
+    for (int n = 0; n < 200; ++n) {
+      const LinkBytes frame(301, static_cast<std::uint8_t>(7 * round + n));
+      if (host->send(frame)) expected.insert(expected.end(), frame.begin(), frame.end());
+    }
+    while (const std::size_t got = joint->receive(part))
+      arrived.insert(arrived.end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(got));
+  }
+  EXPECT_GT(host->counts().not_sent, 0U) << "the line was never full";
+  while (arrived.size() < expected.size()) {
+    static_cast<void>(host->receive(part));  // sends the rest of the last frame
+    const LinkBytes more = received_by(*joint);
+    if (more.empty()) break;
+    arrived.insert(arrived.end(), more.begin(), more.end());
+  }
+  EXPECT_EQ(arrived, expected);
+}
+
 TEST(SerialLine, RefusesWhatIsNotOneOrHasNotTheRate) {
   const auto message = [](const SerialSettings& settings) {
     return test::error_message([&] { static_cast<void>(open_serial(settings)); });
