@@ -114,15 +114,16 @@ Study arm_external(const StudyOptions& options, const Progress& progress) {
   const std::size_t arms = options.is_quick ? kQuickExternalArms : kExternalArms;
   const double duration_s = options.is_quick ? kQuickMotion_s : kMotion_s;
   std::array<std::array<ExternalCase, kSpringSources.size()>, kPayloads_kg.size()> cases;
+  const std::size_t parts = arms * kSpringSources.size() * kSpringFamilies.size();
+  std::size_t part = 0;
   for (std::size_t arm = 0; arm < arms; ++arm) {
     for (std::size_t s = 0; s < kSpringSources.size(); ++s) {
       for (const char* family : kSpringFamilies) {
-        report_progress(progress, static_cast<double>(arm) / static_cast<double>(arms),
-                        fmt::format("arm {} of {}", arm + 1, arms));
         // The recordings do not depend on what the arm carries.
         const std::vector<ModelFile> models = bench_models(
             arm_of_specimens(arm + kSpringSources[s].arms_further, kPayloads_kg.front()), family,
-            options.seed + 100 * arm, progress);
+            options.seed + 100 * arm,
+            nth_of(progress, part++, parts, fmt::format("arm {} of {}", arm + 1, arms)));
         for (std::size_t p = 0; p < kPayloads_kg.size(); ++p) {
           ExternalCase& of = cases[p][s];
           (family == kSpringFamilies.front() ? of.lines : of.learned)

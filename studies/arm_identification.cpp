@@ -4,22 +4,20 @@
 
 #include <array>
 #include <cmath>
-#include <optional>
 #include <utility>
 
+#include "arm_springs.hpp"
+#include "numerics/shared_progress.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
-#include "torsio/fit/common/inputs.hpp"
-#include "torsio/fit/train_model.hpp"
-#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {
 
 constexpr std::size_t kSettledSamples = 500;
-constexpr double kQuick_s = 40.0;
+constexpr double kBenchedPayload_kg = 8.0;
 constexpr double kCycleRate_Hz = 1000.0;
 constexpr double kCycle_s = 8.0;
 constexpr double kCycleShare = 2.2;
@@ -36,7 +34,7 @@ std::vector<double> estimated(const ArmRun& run, std::size_t joint, const ModelF
 
 }  // namespace
 
-ModelFile spring_model(const std::string& family, std::vector<Recording> recordings,
+ModelFile spring_model(std::string_view family, std::vector<Recording> recordings,
                        std::uint64_t seed) {
   Dataset dataset;
   dataset.records.reserve(recordings.size());
@@ -44,29 +42,13 @@ ModelFile spring_model(const std::string& family, std::vector<Recording> recordi
     const std::size_t samples = recording.size();
     dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
   }
-  return train_model(dataset, {.family = family, .features = resolve_inputs(dataset, {})}, seed)
-      .file;
+  return spring_model(family, dataset, seed);
 }
 
-BenchedArm benched_arm(std::size_t number, std::uint64_t seed, bool is_quick,
-                       const Progress& progress) {
-  BenchedArm arm{.setup = arm6_setup()};
-  for (std::size_t j = 0; j < arm.setup.joints.size(); ++j) {
-    ArmJointSetup& joint = arm.setup.joints[j];
-    joint.sheet = data_sheet(fmt::format("{}#{:02}", joint.sheet.name, 1 + 6 * number + j));
-    const SweepProtocol protocol = sweep_protocol(joint.sheet);
-    std::vector<Recording> sweeps;
-    sweeps.reserve(protocol.train_lever_m.size());
-    for (std::size_t k = is_quick ? 2 : 0; k < protocol.train_lever_m.size(); ++k)
-      sweeps.push_back(simulate(joint.sheet,
-                                {.experiment = "sweep",
-                                 .seed = seed + k,
-                                 .duration_s = is_quick ? std::optional(kQuick_s) : std::nullopt,
-                                 .lever_m = protocol.train_lever_m[k]},
-                                progress));
-    arm.linear.push_back(spring_model("linear", sweeps, seed));
-    arm.learned.push_back(spring_model("grey_box", std::move(sweeps), seed));
-  }
+BenchedArm benched_arm(std::size_t number, std::uint64_t seed, const Progress& progress) {
+  BenchedArm arm{.setup = arm_of_specimens(number, kBenchedPayload_kg)};
+  arm.linear = bench_models(arm.setup, "linear", seed, share_of(progress, 0.0, 0.5));
+  arm.learned = bench_models(arm.setup, "grey_box", seed, share_of(progress, 0.5, 1.0));
   return arm;
 }
 

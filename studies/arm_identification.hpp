@@ -3,14 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/arm/arm_model.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/identify/arm_motion.hpp"
 #include "torsio/identify/exciting_program.hpp"
+#include "torsio/identify/identification.hpp"
 #include "torsio/sim/arm/arm_run.hpp"
 #include "torsio/sim/arm/arm_setup.hpp"
 
@@ -23,12 +24,12 @@ struct BenchedArm {
   std::vector<ModelFile> learned = {};  ///< `grey_box`
 };
 
-/// @param number chooses the specimens @param is_quick one sweep in place of three
-[[nodiscard]] BenchedArm benched_arm(std::size_t number, std::uint64_t seed, bool is_quick,
+/// @param number chooses the specimens, as of `arm_of_specimens`
+[[nodiscard]] BenchedArm benched_arm(std::size_t number, std::uint64_t seed,
                                      const Progress& progress);
 
-/// A model of this family with the inputs that `torsio fit` gives it. @param recordings with a channel torque_Nm
-[[nodiscard]] ModelFile spring_model(const std::string& family, std::vector<Recording> recordings,
+/// A model of this family with the inputs of `bench_models`. @param recordings with a channel torque_Nm
+[[nodiscard]] ModelFile spring_model(std::string_view family, std::vector<Recording> recordings,
                                      std::uint64_t seed);
 
 /// The arm moves through a program of `exciting_program`. @throws Error if it stops.

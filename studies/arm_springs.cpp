@@ -65,20 +65,24 @@ ArmSetup arm_of_specimens(std::size_t arm, double payload_kg) {
   return setup;
 }
 
-std::vector<ModelFile> bench_models(const ArmSetup& setup, std::string_view family,
-                                    std::uint64_t seed, const Progress& progress) {
+ModelFile spring_model(std::string_view family, const Dataset& dataset, std::uint64_t seed) {
   const std::vector<std::string> inputs{"spring_deflection_rad",
                                         "lowpass(spring_deflection_rate_rad_s, 10Hz)"};
+  return train_model(dataset,
+                     {.family = std::string(family), .features = resolve_inputs(dataset, inputs)},
+                     seed)
+      .file;
+}
+
+std::vector<ModelFile> bench_models(const ArmSetup& setup, std::string_view family,
+                                    std::uint64_t seed, const Progress& progress) {
   std::vector<ModelFile> models;
   models.reserve(setup.joints.size());
   for (std::size_t j = 0; j < setup.joints.size(); ++j) {
-    report_progress(progress, 0.0, fmt::format("the spring of joint {}", j + 1));
+    report_progress(progress, static_cast<double>(j) / static_cast<double>(setup.joints.size()),
+                    fmt::format("the spring of joint {}", j + 1));
     const Dataset dataset = bench_recordings(full_name(setup.joints[j].sheet), seed + 10 * j);
-    models.push_back(
-        train_model(dataset,
-                    {.family = std::string(family), .features = resolve_inputs(dataset, inputs)},
-                    seed)
-            .file);
+    models.push_back(spring_model(family, dataset, seed));
   }
   return models;
 }

@@ -7,6 +7,7 @@
 
 #include "torsio/arm/arm_controller.hpp"
 #include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/sim/arm/arm_setup.hpp"
 
@@ -16,6 +17,11 @@ namespace torsio {
 /// @param arm which of the arms, from 0
 /// @param payload_kg the payload of `arm6_setup` scaled to this mass
 [[nodiscard]] ArmSetup arm_of_specimens(std::size_t arm, double payload_kg);
+
+/// A model of a joint's torque with its deflection and the rate of it as inputs.
+/// @param dataset recordings with a channel torque_Nm
+[[nodiscard]] ModelFile spring_model(std::string_view family, const Dataset& dataset,
+                                     std::uint64_t seed);
 
 /// A model of the torque of each joint of that arm, fitted to recordings of its actuators on a bench with a load cell:
 /// sweeps with a light and a heavy lever, a chirp and noise of up to the rated torque.

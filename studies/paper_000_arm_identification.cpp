@@ -354,8 +354,8 @@ Study arm_identification_000(const StudyOptions& options, const Progress& progre
   for (std::size_t k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = repeat_seed(options, k);
     Random random(seed);
-    const BenchedArm arm = benched_arm(k, seed, options.is_quick,
-                                       nth_of(progress, 2 * k, 2 * options.repeats, "bench"));
+    const BenchedArm arm =
+        benched_arm(k, seed, nth_of(progress, 2 * k, 2 * options.repeats, "bench"));
     const Progress part = nth_of(progress, 2 * k + 1, 2 * options.repeats, "arm");
     for (std::size_t p = k; p < payloads; p += options.repeats) {
       report_progress(part, static_cast<double>(p) / static_cast<double>(payloads), "payloads");

@@ -26,17 +26,18 @@ void ArmController::end_reaction() noexcept {
 void ArmController::find_contact(const ArmReference& reference,
                                  std::span<const JointSample> samples) noexcept {
   if (!contacts_) return;
-  ArmDynamics::PerJoint on_links_Nm;
   ArmDynamics::PerJoint external_Nm;
   bool is_running = output_.cause == ArmStopCause::none && is_started_;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    on_links_Nm[j] = output_.joints[j].link_Nm;
     external_Nm[j] = output_.joints[j].external_Nm;
     is_running = is_running && joints_[j].stop.phase() == JointStop::Phase::running;
   }
   if (!is_running) contacts_->reset();
-  const ContactDetector::Output& found =
-      contacts_->step(dynamics_, angle_rad_, speed_rad_s_, on_links_Nm, external_Nm);
+  // A reference that is followed has accelerations; elsewhere none is wanted.
+  const ArmDynamics::PerJoint rest = {};
+  const ContactDetector::Output& found = contacts_->step(
+      dynamics_, angle_rad_, speed_rad_s_,
+      is_following_ && !is_reacting_ ? reference.acceleration_rad_s2 : rest, external_Nm);
   for (std::size_t j = 0; j < joints_.size(); ++j)
     output_.joints[j].external_std_Nm = found.std_dev_Nm[j];
   if (!is_running || is_reacting_) return;
@@ -50,10 +51,10 @@ void ArmController::find_contact(const ArmReference& reference,
   output_.contact = {.is_found = true,
                      .joint = found.joint,
                      .time_s = samples.empty() ? kNotMeasured : samples[found.joint].t_s};
-  react(reference);
+  react();
 }
 
-void ArmController::react(const ArmReference& reference) noexcept {
+void ArmController::react() noexcept {
   if (!is_following_ && !is_holding_) return;
   output_.contact.reaction = settings_.reaction;
   switch (settings_.reaction) {
@@ -70,9 +71,9 @@ void ArmController::react(const ArmReference& reference) noexcept {
         external_Nm[j] = output_.joints[j].external_Nm;
         rotor_kg_m2[j] = joints_[j].drive.inertia();
         limit_rad_s[j] = joints_[j].speed_limit_rad_s;
-        speed_rad_s[j] = is_following_ ? reference.velocity_rad_s[j] : 0.0;
+        speed_rad_s[j] = is_following_ ? speed_rad_s_[j] : 0.0;
       }
-      // From where the links are: the reference is ahead of them, inside of what they touch.
+      // From where the links are and as fast: the reference is ahead of them, inside of what they touch.
       reaction_.begin(dynamics_, angle_rad_, speed_rad_s, external_Nm, rotor_kg_m2, limit_rad_s,
                       settings_.reaction == ContactReaction::retract);
       reacting_ = {.mode = ArmMode::position};

@@ -16,8 +16,8 @@ constexpr auto kDetectorPlace = "contact detector";
 }  // namespace
 
 void external_torque_terms(const ArmDynamics& dynamics, std::span<const double> angle_rad,
-                           std::span<const double> speed_rad_s, std::span<const double> torque_Nm,
-                           std::span<const double> external_Nm,
+                           std::span<const double> speed_rad_s,
+                           std::span<const double> acceleration_rad_s2,
                            std::span<ExternalTorqueTerms> terms) noexcept {
   const std::size_t n = dynamics.size();
   ArmDynamics::JointMatrix mass_kg_m2;
@@ -25,9 +25,14 @@ void external_torque_terms(const ArmDynamics& dynamics, std::span<const double> 
   dynamics.equation(angle_rad, speed_rad_s, mass_kg_m2, bias_Nm);
   for (std::size_t i = 0; i < n; ++i) {
     double row = 0.0;
-    for (std::size_t j = 0; j < n; ++j) row += mass_kg_m2[i * n + j] * mass_kg_m2[i * n + j];
-    const double inertial_Nm = torque_Nm[i] + external_Nm[i] - bias_Nm[i];
-    terms[i] = {1.0, row, torque_Nm[i] * torque_Nm[i], inertial_Nm * inertial_Nm};
+    double inertial_Nm = 0.0;
+    for (std::size_t j = 0; j < n; ++j) {
+      const double mass = mass_kg_m2[i * n + j];
+      row += mass * mass;
+      inertial_Nm += mass * acceleration_rad_s2[j];
+    }
+    const double torque_Nm = inertial_Nm + bias_Nm[i];
+    terms[i] = {1.0, row, torque_Nm * torque_Nm, inertial_Nm * inertial_Nm};
   }
 }
 
@@ -56,9 +61,9 @@ ContactDetector::ContactDetector(const Settings& settings, double sample_rate_Hz
 const ContactDetector::Output& ContactDetector::step(const ArmDynamics& dynamics,
                                                      std::span<const double> angle_rad,
                                                      std::span<const double> speed_rad_s,
-                                                     std::span<const double> torque_Nm,
+                                                     std::span<const double> acceleration_rad_s2,
                                                      std::span<const double> external_Nm) noexcept {
-  external_torque_terms(dynamics, angle_rad, speed_rad_s, torque_Nm, external_Nm, terms_);
+  external_torque_terms(dynamics, angle_rad, speed_rad_s, acceleration_rad_s2, terms_);
   output_.largest_share = 0.0;
   output_.joint = 0;
   for (std::size_t j = 0; j < count_; ++j) {

@@ -8,7 +8,7 @@
 #include "identify/momentum_windows.hpp"
 #include "identify/weighted_fit.hpp"
 #include "torsio/arm/arm_model.hpp"
-#include "torsio/identify/identified_quantity.hpp"
+#include "torsio/identify/identification.hpp"
 #include "torsio/identify/identify_payload.hpp"
 
 namespace torsio {

@@ -1,5 +1,3 @@
-#include "torsio/identify/arm_motion.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 
 #include "sim/arm/joint_channels.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/identify/identification.hpp"
 
 namespace torsio {
 namespace {

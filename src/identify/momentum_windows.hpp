@@ -7,7 +7,7 @@
 
 #include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/arm/arm_model.hpp"
-#include "torsio/identify/arm_motion.hpp"
+#include "torsio/identify/identification.hpp"
 
 namespace torsio {
 

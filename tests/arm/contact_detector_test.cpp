@@ -28,14 +28,12 @@ ContactDetector::Settings six_joints(const ExternalTorqueTerms& coefficients, do
   return settings;
 }
 
-/// A detector on an arm at rest in one pose, for which the springs carry the weight.
+/// A detector on an arm at rest in one pose, that begins to move.
 class DetectorAtRest : public testing::Test {
  protected:
-  DetectorAtRest() { dynamics_.gravity_torque(angle_rad_, torque_Nm_); }
-
   const ContactDetector::Output& step(ContactDetector& detector,
                                       const test::Arm6Joints& external_Nm) {
-    return detector.step(dynamics_, angle_rad_, speed_rad_s_, torque_Nm_, external_Nm);
+    return detector.step(dynamics_, angle_rad_, speed_rad_s_, acceleration_rad_s2_, external_Nm);
   }
   void settle(ContactDetector& detector) {
     for (int n = 0; n < 20; ++n) step(detector, {});
@@ -44,29 +42,33 @@ class DetectorAtRest : public testing::Test {
   ArmDynamics dynamics_ = ArmDynamics(test::arm6());
   test::Arm6Joints angle_rad_ = {0.1, -0.6, 1.2, 0.2, 0.6, 0.1};
   test::Arm6Joints speed_rad_s_ = {};
-  test::Arm6Joints torque_Nm_ = {};
+  test::Arm6Joints acceleration_rad_s2_ = {1.0, -2.0, 0.5, 3.0, -1.0, 2.0};
 };
 
 TEST_F(DetectorAtRest, HasTheVarianceOfItsFormula) {
   std::array<ExternalTorqueTerms, kMaxArmJoints> terms;
-  const test::Arm6Joints external_Nm = {0.5, 1.0, -1.0, 0.1, 0.2, 0.0};
-  external_torque_terms(dynamics_, angle_rad_, speed_rad_s_, torque_Nm_, external_Nm, terms);
+  external_torque_terms(dynamics_, angle_rad_, speed_rad_s_, acceleration_rad_s2_, terms);
   ArmDynamics::JointMatrix mass;
   dynamics_.mass_matrix(angle_rad_, mass);
+  test::Arm6Joints torque_Nm = {};
+  dynamics_.inverse(angle_rad_, speed_rad_s_, acceleration_rad_s2_, torque_Nm);
   for (std::size_t i = 0; i < test::kArm6Joints; ++i) {
     double row = 0.0;
-    for (std::size_t j = 0; j < test::kArm6Joints; ++j) row += mass[6 * i + j] * mass[6 * i + j];
+    double inertial_Nm = 0.0;
+    for (std::size_t j = 0; j < test::kArm6Joints; ++j) {
+      row += mass[6 * i + j] * mass[6 * i + j];
+      inertial_Nm += mass[6 * i + j] * acceleration_rad_s2_[j];
+    }
     EXPECT_EQ(terms[i][0], 1.0);
-    EXPECT_NEAR(terms[i][1], row, 1e-9 * row);
-    EXPECT_NEAR(terms[i][2], torque_Nm_[i] * torque_Nm_[i], 1e-9);
-    // At rest under its weight what is left is the external torque.
-    EXPECT_NEAR(terms[i][3], external_Nm[i] * external_Nm[i], 1e-9);
+    EXPECT_NEAR(terms[i][1], row, 1e-9);
+    EXPECT_NEAR(terms[i][2], torque_Nm[i] * torque_Nm[i], 1e-6);
+    EXPECT_NEAR(terms[i][3], inertial_Nm * inertial_Nm, 1e-9);
   }
-  ContactDetector detector(six_joints({0.04, 2.0, 0.01, 0.0}, 5.0), kDetectorRate_Hz);
-  const auto& output = step(detector, external_Nm);
+  ContactDetector detector(six_joints({0.04, 2.0, 0.01, 0.5}, 5.0), kDetectorRate_Hz);
+  const auto& output = step(detector, {0.5, 1.0, -1.0});
   for (std::size_t i = 0; i < test::kArm6Joints; ++i)
     EXPECT_NEAR(output.std_dev_Nm[i],
-                std::sqrt(0.04 + 2.0 * terms[i][1] + 0.01 * torque_Nm_[i] * torque_Nm_[i]), 1e-9);
+                std::sqrt(0.04 + 2.0 * terms[i][1] + 0.01 * terms[i][2] + 0.5 * terms[i][3]), 1e-9);
 }
 
 TEST_F(DetectorAtRest, FindsWhatIsAboveItsThresholdAndNamesTheJoint) {

@@ -27,11 +27,14 @@ class ArmCalibrate : public Program {
 
 TEST_F(ArmCalibrate, RecordsAnExcitingProgramAndGivesTrainingData) {
   write_arm("side_30.yaml", kSide);
-  const Outcome excited =
-      torsio("arm excite side_30.yaml --moves 4 --candidates 6 -o moves.yaml --json excited.json");
+  const Outcome excited = torsio(
+      "arm excite side_30.yaml --for springs --moves 6 --candidates 6 -o moves.yaml --json "
+      "excited.json");
   ASSERT_EQ(excited.exit_code, 0) << excited.err;
-  EXPECT_NE(excited.out.find("condition number of the regressor"), std::string::npos);
-  EXPECT_EQ(nlohmann::json::parse(contents("excited.json"))["moves"], 4);
+  EXPECT_NE(torsio("arm excite side_30.yaml --moves 4 --candidates 6 -o payload.yaml")
+                .out.find("condition number of the regressor"),
+            std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(contents("excited.json"))["moves"], 6);
   const Outcome moved =
       torsio("arm side_30.yaml --rigid-gears --program moves.yaml -o side_30.csv --json arm.json");
   ASSERT_EQ(moved.exit_code, 0) << moved.err;

@@ -130,6 +130,82 @@ TEST_F(Arm, RefusesWhatCannotBeWithPlaceAndReason) {
   expect_refusal("nothing.yaml --describe", "nothing.yaml");
 }
 
+TEST_F(Arm, RefusesPushesThatDoNothing) {
+  write_program("  - hold: 1s\n    push: {force: [1N, 0N, 0N], at: 0.8s, for: 0.5s}\n");
+  expect_refusal("--program moves.yaml", "within the 1 s of its step");
+  write_program("  - hold: 1s\n    push: {at: 0.1s, for: 0.5s}\n");
+  expect_refusal("--program moves.yaml", "a force, a moment or a torque");
+}
+
+TEST_F(Arm, ReplacesNoFileThatItReads) {
+  std::string path = "t_s";
+  for (int j = 1; j <= 6; ++j) path += ",joint" + std::to_string(j) + "_angle_rad";
+  for (int n = 0; n < 50; ++n) path += "\n" + std::to_string(1e-3 * n) + ",0,-1,1.7,0,0.7,0";
+  folder_.file("path.csv", path + "\n");
+  folder_.file("moves.yaml",
+               "start: [0, -1, 1.7, 0, 0.7, 0]\nprogram: [{follow: path.csv}, {hold: 0.1s}]\n");
+  expect_refusal("--program moves.yaml -o path.csv", "path.csv");
+  EXPECT_EQ(contents("path.csv"), path + "\n");
+  ASSERT_EQ(torsio("arm --program moves.yaml --joints new/folder").exit_code, 0);
+  EXPECT_NE(contents("new/folder/joint6.csv"), "");
+  // What was too short for filters to settle has no score.
+  const Outcome outcome = torsio("arm --program moves.yaml");
+  EXPECT_NE(outcome.out.find("joint6  dfki-28                 -"), std::string::npos)
+      << outcome.out;
+}
+
+TEST_F(Arm, StatesThatAReferenceWasRefused) {
+  std::string path = "t_s";
+  for (int j = 1; j <= 6; ++j) path += ",joint" + std::to_string(j) + "_angle_rad";
+  for (int n = 0; n < 700; ++n) path += "\n" + std::to_string(1e-3 * n) + ",0,-1,1.7,0,0.7,0";
+  folder_.file("path.csv", path + "\n");
+  folder_.file("moves.yaml",
+               "start: [0, -1, 1.7, 0, 0.7, 0]\nprogram:\n"
+               "  - guide: 2s\n    push: {force: [0N, 60N, 0N], at: 0.2s, for: 0.8s}\n"
+               "  - follow: path.csv\n");
+  const Outcome outcome = torsio("arm --program moves.yaml");
+  EXPECT_NE(outcome.out.find("was not carried out"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Arm, RemarksOnWhatTheResultDoesNotShow) {
+  write_program("  - hold: 1s\n    push: {torque: {joint6: 60Nm}, at: 0.2s, for: 0.01s}\n");
+  const Outcome outcome = torsio("arm --program moves.yaml --fault joint2:joint_angle=nan@9s");
+  EXPECT_NE(outcome.err.find("the fault of joint2 at 9 s is after the end"), std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("joint6 reached"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Arm, NamesTheWrongWord) {
+  expect_refusal("arm6 --progam moves.yaml", "there is no option '--progam'");
+  expect_refusal("--progam moves.yaml", "there is no option '--progam'");
+  expect_refusal("arm6 identify moves.csv", "nothing between the two words");
+}
+
+TEST_F(Arm, LearnsContactsAndRetractsFromAPlate) {
+  ASSERT_EQ(torsio("arm learn-contacts --payload 3kg --hours 0.02 -o contacts.json").exit_code, 0);
+  folder_.file("moves.yaml",
+               "start: [0deg, -60deg, 100deg, 0deg, 40deg, 0deg]\ncontact: retract\nprogram:\n"
+               "  - hold: 1s\n  - move: [0deg, -40deg, 100deg, 0deg, 40deg, 0deg]\n"
+               "    plate: {from_flange: [0mm, 0mm, -60mm], normal: [0, 0, 1], stiffness_N_m: "
+               "75000}\n");
+  const std::string call = "arm --payload 3kg --program moves.yaml";
+  const Outcome outcome = torsio(call + " --contacts contacts.json -o arm.csv --json arm.json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(contents("arm.json"));
+  ASSERT_EQ(document["contacts"].size(), 1U) << document.dump();
+  EXPECT_EQ(document["contacts"][0]["reaction"], "retract");
+  EXPECT_LT(document["contacts"][0]["latency_s"], 0.03);
+  EXPECT_EQ(document["plate"]["largest_after_80_ms_N"], 0.0);
+  EXPECT_NE(contents("arm.csv").find("plate_force_N"), std::string::npos);
+
+  expect_refusal("learn-contacts --hours 0.02 --false-alarms-per-hour 1 -o few.json",
+                 "the motion is too short for this rate");
+  expect_refusal("--payload 5kg --program moves.yaml --contacts contacts.json", "payload");
+  std::string text = contents("contacts.json");
+  folder_.file("cut.json", text.substr(0, text.size() / 2));
+  expect_refusal("--payload 3kg --program moves.yaml --contacts cut.json", "cut.json");
+}
+
 TEST_F(Arm, RunsTheExample) {
   const Outcome outcome = shell(std::string(TORSIO_EXAMPLES) + "/example_12_move_arm " +
                                 TORSIO_SOURCE + "/share/torsio/arm6.urdf");

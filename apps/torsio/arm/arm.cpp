@@ -103,9 +103,12 @@ std::string stop_text(const torsio::ArmRun& run) {
   if (run.cause == torsio::ArmStopCause::none && run.refused_s > 0.0)
     return fmt::format(
         "The program ended, but was not carried out: from {:.3f} s on its reference was refused "
-        "for "
-        "{:.2f} s, since it began too far from the measured angles, and the arm held.",
+        "for {:.2f} s, since it began too far from the measured angles, and the arm held.",
         run.refused_from_s, run.refused_s);
+  if (run.cause == torsio::ArmStopCause::none && !run.contacts.empty() &&
+      run.contacts.back().reaction != torsio::ContactReaction::none)
+    return fmt::format("The reaction to a contact ended the program: {}.",
+                       torsio::name(run.contacts.back().reaction));
   if (run.cause == torsio::ArmStopCause::none) return "The program was carried out to its end.";
   const std::string cause(torsio::name(run.cause));
   return fmt::format(
@@ -152,18 +155,19 @@ std::string score_text(const torsio::ArmRun& run) {
          "and holds\n";
 }
 
+Json number_or_null(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
 Json plate_json(const torsio::ArmRun& run) {
   if (!run.impact) return nullptr;
   const torsio::ArmImpact& impact = *run.impact;
-  const auto force = [](const std::optional<double>& value) {
-    return value ? Json(*value) : Json(nullptr);
-  };
   return {{"touched_s", impact.touched_s},
           {"first_peak_N", impact.first_peak_N},
           {"peak_N", impact.peak_N},
           {"peak_after_s", impact.peak_after_s},
-          {"largest_after_80_ms_N", force(impact.largest_late_N)},
-          {"after_500_ms_N", force(impact.rest_N)}};
+          {"largest_after_80_ms_N", number_or_null(impact.largest_late_N)},
+          {"after_500_ms_N", number_or_null(impact.rest_N)}};
 }
 
 Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
@@ -185,19 +189,17 @@ Json run_json(const ArmFlags& flags, const torsio::ArmRun& run) {
       {"plate", plate_json(run)},
       {"joints", Json::array()}};
   for (const torsio::ArmContact& contact : run.contacts)
-    document["contacts"].push_back(
-        {{"found_s", contact.found_s},
-         {"joint", contact.joint},
-         {"reaction", torsio::name(contact.reaction)},
-         {"latency_s", contact.latency_s ? Json(*contact.latency_s) : Json(nullptr)}});
+    document["contacts"].push_back({{"found_s", contact.found_s},
+                                    {"joint", contact.joint},
+                                    {"reaction", torsio::name(contact.reaction)},
+                                    {"latency_s", number_or_null(contact.latency_s)}});
   for (const torsio::ArmJointScore& score : run.scores)
     document["joints"].push_back(
         {{"joint", score.joint},
          {"actuator", score.actuator},
-         {"position_rmse_rad",
-          score.position_rmse_rad ? Json(*score.position_rmse_rad) : Json(nullptr)},
-         {"torque_rmse_Nm", score.torque_rmse_Nm},
-         {"external_torque_rmse_Nm", score.external_rmse_Nm},
+         {"position_rmse_rad", number_or_null(score.position_rmse_rad)},
+         {"torque_rmse_Nm", number_or_null(score.torque_rmse_Nm)},
+         {"external_torque_rmse_Nm", number_or_null(score.external_rmse_Nm)},
          {"largest_torque_Nm", score.largest_torque_Nm},
          {"largest_share", score.largest_share},
          {"limited_s", score.limited_s}});
@@ -234,7 +236,8 @@ void check_all_outputs(const ArmFlags& flags, const torsio::ArmSetup& setup,
   inputs.insert(inputs.end(), program.files.begin(), program.files.end());
   std::vector<std::string> outputs = {flags.output, flags.json.destination,
                                       flags.report.destination, flags.report.plot};
-  if (!flags.folder.empty())
+  // In a new folder no file is replaced.
+  if (std::filesystem::is_directory(flags.folder))
     for (std::size_t j = 0; j < setup.joints.size(); ++j)
       outputs.push_back(joint_file(flags.folder, j));
   DataFlags().check_outputs(outputs, inputs);

@@ -43,10 +43,12 @@ std::string unknown_name(const CLI::App& app, int argc, char** argv) {
     const std::string place = "torsio " + verb->get_name();
     for (const CLI::App* part : verb->get_subcommands())
       return unknown_option(*part, part->remaining(), place + " " + part->get_name());
-    if (const auto parts = verb->get_subcommands({}); !parts.empty())
-      for (const std::string& word : verb->remaining())
-        if (!word.starts_with('-')) return refusal(place, "verb", word, names_of(parts));
-    return unknown_option(*verb, verb->remaining(), place);
+    const std::vector<std::string> left = verb->remaining();
+    // A word after an unknown option is the option's value.
+    if (const auto parts = verb->get_subcommands({});
+        !parts.empty() && !left.empty() && !left.front().starts_with('-'))
+      return refusal(place, "verb", left.front(), names_of(parts));
+    return unknown_option(*verb, left, place);
   }
   const std::vector<std::string> verbs = names_of(app.get_subcommands({}));
   for (const char* word : std::span(argv, static_cast<std::size_t>(argc)).subspan(1))

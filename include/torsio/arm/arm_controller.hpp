@@ -235,7 +235,7 @@ class ArmController {
   void find(ArmStopCause cause, std::size_t joint) noexcept;
   void prove() noexcept;
   void find_contact(const ArmReference& reference, std::span<const JointSample> samples) noexcept;
-  void react(const ArmReference& reference) noexcept;
+  void react() noexcept;
   const ArmReference& reaction_reference() noexcept;
   /// In a retreat or floating, shortly after a contact.
   [[nodiscard]] bool is_yielding() const noexcept;

@@ -17,11 +17,13 @@ using ExternalTorqueTerms = std::array<double, kExternalTorqueTerms>;
 
 /// The error bar of the external torque at a joint, one standard deviation:
 ///
-///     σ_i² = a + b |row i of M(q)|² + c τ_i² + d (M(q) q̈)_i²,   a, b, c, d ≥ 0
+///     σ_i² = a + b |row i of M(q)|² + c τ*_i² + d (M(q) q̈*)_i²,   a, b, c, d ≥ 0
+///     τ* = M(q) q̈* + c(q, q̇) + g(q)
 ///
 /// a: what is always there [Nm²]. b: noise of the encoders' differences, which the observer multiplies with the mass
-/// matrix [1/s⁴]. c: the error of the spring's torque τ_i, as a share of it, squared. d: the error of masses and of the
-/// delay, likewise; (M q̈)_i = τ_i + τ_ext,i − c_i − g_i.
+/// matrix [1/s⁴]. c: the error of the spring's torque, as a share of it, squared. d: the error of masses and of the
+/// delay, likewise. q̈* and τ* are those of the wanted motion, not the measured ones: a contact must not widen the
+/// error bar with which it is compared.
 struct ExternalTorqueError {
   ExternalTorqueTerms coefficients = {1.0, 0.0, 0.0, 0.0};  ///< a, b, c, d
 
@@ -33,17 +35,16 @@ struct ExternalTorqueError {
   }
 };
 
-/// The terms of every joint in one state: 1, |row i of M|², τ_i², (M q̈)_i².
-/// @param torque_Nm on the links, of the springs less the friction of the bearings
-/// @param external_Nm of the `MomentumObserver`
+/// The terms of every joint in one state: 1, |row i of M|², τ*_i², (M q̈*)_i².
+/// @param acceleration_rad_s2 q̈*, wanted; 0 where none is
 void external_torque_terms(const ArmDynamics& dynamics, std::span<const double> angle_rad,
-                           std::span<const double> speed_rad_s, std::span<const double> torque_Nm,
-                           std::span<const double> external_Nm,
+                           std::span<const double> speed_rad_s,
+                           std::span<const double> acceleration_rad_s2,
                            std::span<ExternalTorqueTerms> terms) noexcept TORSIO_REALTIME;
 
 /// Finds contacts of an arm: the external torque of a joint is more than k_i of its standard deviations,
 ///
-///     |τ_ext,i| > k_i σ_i(q, τ, q̈)
+///     |τ_ext,i| > k_i σ_i(q, q̇, q̈*)
 ///
 /// with σ_i and k_i learned from motion without contacts (`learn_contacts`) for a rate of false alarms. What the arm
 /// carries must be that of the learning, or be set in its dynamics: a mass that is not in the model is an external torque.
@@ -72,9 +73,11 @@ class ContactDetector {
   /// From now on as after the start.
   void reset() noexcept TORSIO_REALTIME { since_ticks_ = 0; }
 
-  /// As `external_torque_terms`. What is not finite is not a contact.
+  /// As `external_torque_terms`. @param external_Nm of the `MomentumObserver`
+  /// What is not finite is not a contact.
   const Output& step(const ArmDynamics& dynamics, std::span<const double> angle_rad,
-                     std::span<const double> speed_rad_s, std::span<const double> torque_Nm,
+                     std::span<const double> speed_rad_s,
+                     std::span<const double> acceleration_rad_s2,
                      std::span<const double> external_Nm) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] std::size_t size() const noexcept { return count_; }

@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "torsio/arm/arm_model.hpp"
-#include "torsio/identify/arm_motion.hpp"
-#include "torsio/identify/identified_quantity.hpp"
+#include "torsio/identify/identification.hpp"
 
 namespace torsio {
 

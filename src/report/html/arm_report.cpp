@@ -112,17 +112,18 @@ std::vector<ReportFigure> arm_figures(const ArmModel& arm,
 }
 
 TextTable arm_scores(const ArmRun& run) {
+  const auto scored = [](const std::optional<double>& value, double scale, int digits) {
+    return value ? fmt::format("{:.{}f}", scale * *value, digits) : std::string("-");
+  };
   TextTable table;
   table.header({"joint", "actuator", "position [mrad]", "torque [Nm]", "external torque [Nm]",
                 "largest torque [Nm]", "of the rating [%]", "limited [s]"});
   for (const ArmJointScore& score : run.scores)
-    table.row(
-        {score.joint, score.actuator,
-         score.position_rmse_rad ? fmt::format("{:.2f}", 1e3 * *score.position_rmse_rad) : "-",
-         fmt::format("{:.3f}", score.torque_rmse_Nm), fmt::format("{:.3f}", score.external_rmse_Nm),
-         fmt::format("{:.1f}", score.largest_torque_Nm),
-         fmt::format("{:.0f}", 100.0 * score.largest_share),
-         fmt::format("{:.2f}", score.limited_s)});
+    table.row({score.joint, score.actuator, scored(score.position_rmse_rad, 1e3, 2),
+               scored(score.torque_rmse_Nm, 1.0, 3), scored(score.external_rmse_Nm, 1.0, 3),
+               fmt::format("{:.1f}", score.largest_torque_Nm),
+               fmt::format("{:.0f}", 100.0 * score.largest_share),
+               fmt::format("{:.2f}", score.limited_s)});
   return table;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "sim/arm/joint_channels.hpp"
@@ -26,8 +27,9 @@ constexpr std::array kControlNames{"wanted_angle_rad",
                                    "truth_external_torque_Nm"};
 constexpr std::size_t kTruthNames = 3;
 
-double root_mean(double squares, std::size_t count) {
-  return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));
+std::optional<double> root_mean(double squares, std::size_t count) {
+  if (count == 0) return {};
+  return std::sqrt(squares / static_cast<double>(count));
 }
 
 }  // namespace
@@ -120,8 +122,7 @@ void ArmLog::finish(ArmRun& run) && {
     }
     run.joints.push_back(std::move(own));
     ArmJointScore score = std::move(joint.score);
-    if (joint.positions > 0)
-      score.position_rmse_rad = root_mean(joint.squared_position, joint.positions);
+    score.position_rmse_rad = root_mean(joint.squared_position, joint.positions);
     score.torque_rmse_Nm = root_mean(joint.squared_torque, joint.scored);
     score.external_rmse_Nm = root_mean(joint.squared_external, joint.scored);
     score.largest_share = score.largest_torque_Nm / joint.rating_Nm;

@@ -10,8 +10,10 @@
 #include "arm/vector3.hpp"
 #include "data/yaml_reader.hpp"
 #include "sim/arm/arm_bench.hpp"
+#include "sim/arm/path_motion.hpp"
 #include "sim/arm/plate_contact.hpp"
 #include "sim/sensors/sensor_set.hpp"
+#include "torsio/arm/arm_dynamics.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
@@ -176,6 +178,32 @@ void check_path(const std::vector<std::vector<double>>& path_rad, const ArmSetup
   }
 }
 
+/// The torques of the links, as without contacts.
+void check_torques(const std::vector<std::vector<double>>& path_rad, const ArmSetup& setup,
+                   const std::string& file) {
+  const ArmDynamics dynamics(setup.arm);
+  ArmDynamics::PerJoint angle_rad = {};
+  ArmDynamics::PerJoint speed_rad_s = {};
+  ArmDynamics::PerJoint acceleration_rad_s2 = {};
+  ArmDynamics::PerJoint torque_Nm = {};
+  for (std::size_t n = 0; n < path_rad.front().size(); ++n) {
+    for (std::size_t j = 0; j < path_rad.size(); ++j) {
+      angle_rad[j] = path_rad[j][n];
+      speed_rad_s[j] = path_speed(path_rad[j], n);
+      acceleration_rad_s2[j] = path_acceleration(path_rad[j], n);
+    }
+    dynamics.inverse(angle_rad, speed_rad_s, acceleration_rad_s2, torque_Nm);
+    for (std::size_t j = 0; j < path_rad.size(); ++j)
+      if (std::abs(torque_Nm[j]) > setup.arm.joints[j].effort_Nm)
+        throw Error({.place = at_sample(file, n),
+                     .problem = fmt::format("the trajectory needs more torque than joint '{}' has",
+                                            setup.arm.joints[j].name),
+                     .expected = fmt::format("at most {:.4g} Nm", setup.arm.joints[j].effort_Nm),
+                     .found = fmt::format("{:.4g} Nm", std::abs(torque_Nm[j])),
+                     .advice = "Make it slower or smoother."});
+  }
+}
+
 std::vector<std::vector<double>> path_of(const YamlValue& yaml, const std::string& file,
                                          const ArmSetup& setup, const Progress& progress) {
   LoadOptions options;
@@ -195,6 +223,7 @@ std::vector<std::vector<double>> path_of(const YamlValue& yaml, const std::strin
     path_rad.push_back(recording.channel(name).values);
   }
   check_path(path_rad, setup, file);
+  check_torques(path_rad, setup, file);
   return path_rad;
 }
 

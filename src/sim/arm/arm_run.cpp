@@ -15,6 +15,7 @@
 #include "sim/arm/arm_log.hpp"
 #include "sim/arm/arm_session.hpp"
 #include "sim/arm/contact_watch.hpp"
+#include "sim/arm/path_motion.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -135,11 +136,9 @@ class ProgramReference {
   void follow(const std::vector<std::vector<double>>& path_rad) {
     for (std::size_t j = 0; j < path_rad.size(); ++j) {
       const std::vector<double>& q = path_rad[j];
-      const std::size_t before = tick_ == 0 ? 0 : tick_ - 1;
-      const std::size_t after = std::min(tick_ + 1, q.size() - 1);
-      const double width_s = static_cast<double>(after - before) * kArmTick_s;
       reference_.position_rad[j] = q[tick_];
-      reference_.velocity_rad_s[j] = width_s > 0.0 ? (q[after] - q[before]) / width_s : 0.0;
+      reference_.velocity_rad_s[j] = path_speed(q, tick_);
+      reference_.acceleration_rad_s2[j] = path_acceleration(q, tick_);
     }
   }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "arm/vector3.hpp"
-#include "torsio/sim/arm/arm_plate.hpp"
+#include "torsio/sim/arm/arm_run.hpp"
 
 namespace torsio {
 

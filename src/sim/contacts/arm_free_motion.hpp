@@ -24,6 +24,7 @@ class ArmFreeMotion {
   const ArmController::Output& control();
   void act(const ArmLoad& load) { session_.act(load); }
 
+  [[nodiscard]] const ArmReference& reference() const noexcept { return reference_; }
   [[nodiscard]] const ArmSession& session() const noexcept { return session_; }
 
  private:

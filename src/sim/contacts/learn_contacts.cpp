@@ -21,10 +21,13 @@ namespace {
 constexpr double kHour_s = 3600.0;
 constexpr double kLongestPart_s = 600.0;  // motion on one thread
 constexpr double kFitShare = 0.1;
-constexpr double kShortestFit_s = 120.0;
+constexpr double kShortestFit_s =
+    360.0;  // in 120 s the variance of a joint is off by up to 2.5 times
 constexpr double kShortestHours = 0.02;
 constexpr double kLongestHours = 1000.0;
 constexpr double kBlock_s = 10.0;
+// A threshold from the hours that just support a rate is exceeded about twice as often in other hours.
+constexpr double kRateShare = 1.0 / 3.0;
 constexpr std::size_t kFitEvery = 50;  // ticks between samples of the fit
 constexpr std::size_t kProgressEvery = 20'000;
 constexpr double kRateTolerance = 1e-6;
@@ -84,15 +87,11 @@ Part move_freely(const Work& work, double duration_s, std::uint64_t seed,
     const ArmController::Output& output = motion.control();
     const bool is_sampled = !work.errors.empty() || tick % kFitEvery == 0;
     if (is_sampled) {
-      ArmDynamics::PerJoint torque_Nm;
       ArmDynamics::PerJoint external_Nm;
-      for (std::size_t j = 0; j < joints; ++j) {
-        torque_Nm[j] = output.joints[j].link_Nm;
-        external_Nm[j] = output.joints[j].external_Nm;
-      }
+      for (std::size_t j = 0; j < joints; ++j) external_Nm[j] = output.joints[j].external_Nm;
       const ArmSession& session = motion.session();
       external_torque_terms(session.controller().dynamics(), session.angle_rad(),
-                            session.speed_rad_s(), torque_Nm, external_Nm, terms);
+                            session.speed_rad_s(), motion.reference().acceleration_rad_s2, terms);
       if (work.errors.empty()) {
         for (std::size_t j = 0; j < joints; ++j) {
           part.samples[j].external_Nm.push_back(external_Nm[j]);
@@ -190,7 +189,7 @@ LearnedContacts learn_contacts(const ArmSetup& setup, const ArmController::Setti
                .false_alarms_per_hour = rate,
                .upper_bound_per_hour = supported_rate_per_hour(learning.hours)}};
   const std::size_t joints = setup.joints.size();
-  const double share = rate * kBlock_s / kHour_s / static_cast<double>(joints);
+  const double share = kRateShare * rate * kBlock_s / kHour_s / static_cast<double>(joints);
   for (std::size_t j = 0; j < joints; ++j) {
     BlockMaxima maxima(1);
     LearnedContacts::Joint& of = learned.joints.emplace_back();

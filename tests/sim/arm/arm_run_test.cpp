@@ -258,7 +258,17 @@ TEST_F(ArmFiles, TheReadyArmIsThatOfItsFile) {
     EXPECT_EQ(full_name(file.joints[j].sheet), full_name(ready.joints[j].sheet));
     EXPECT_EQ(file.arm.joints[j].body.mass_kg, ready.arm.joints[j].body.mass_kg);
     EXPECT_EQ(file.moves[j].jerk_rad_s3, ready.moves[j].jerk_rad_s3);
+    // The URDF file permits 1 rad/s, the rating of dfki-300 a little less.
+    EXPECT_LE(file.arm.joints[j].speed_rad_s, file.joints[j].sheet.rating.speed_rad_s.value);
   }
+}
+
+TEST_F(ArmFiles, AJointIsAsStrongAsItsActuator) {
+  folder_.file("arm.yaml",
+               changed_arm("joint1: {actuator: dfki-300}", "joint1: {actuator: dfki-120}"));
+  const ArmSetup setup = read_arm(folder_.path("arm.yaml"));
+  EXPECT_EQ(setup.arm.joints[0].effort_Nm, setup.joints[0].sheet.rating.torque_Nm.value);
+  EXPECT_EQ(setup.arm.joints[1].effort_Nm, 300.0);
 }
 
 TEST_F(ArmFiles, AnArmThatCannotBeIsRefusedWithFileAndLine) {
@@ -320,6 +330,15 @@ TEST_F(ArmFiles, ATrajectoryThatCrossesALimitIsRefusedWithTheLineOfItsFile) {
   EXPECT_THAT(error(1.71, 1.7),
               AllOf(HasSubstr("path.csv: line 5"), HasSubstr("too fast for joint 'joint3'")));
   EXPECT_THAT(error(1.5, 1.5), HasSubstr("does not begin where"));
+  // Joint 2 goes from rest to nearly its full speed within one tick; the joint that it then turns is the first that is too weak.
+  std::string text =
+      "t_s,joint1_angle_rad,joint2_angle_rad,joint3_angle_rad,joint4_angle_rad,joint5_angle_rad,"
+      "joint6_angle_rad\n";
+  for (int n = 0; n < 200; ++n)
+    text += fmt::format("{},0,{},1.7,0,0.7,0\n", 1e-3 * n, -1.0 + 0.7e-3 * std::max(n - 100, 0));
+  folder_.file("path.csv", text);
+  EXPECT_THAT(program_error("start: [0, -1, 1.7, 0, 0.7, 0]\nprogram: [{follow: path.csv}]\n"),
+              AllOf(HasSubstr("path.csv: line"), HasSubstr("more torque than joint 'joint3' has")));
   folder_.file("path.csv", "t_s,joint1_angle_rad\n0,0\n0.001,0\n");
   EXPECT_THAT(program_error("start: [0, -1, 1.7, 0, 0.7, 0]\nprogram: [{follow: path.csv}]\n"),
               HasSubstr("a channel 'joint2_angle_rad'"));

@@ -9,11 +9,22 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/arm/arm_plate.hpp"
 #include "torsio/sim/arm/arm_setup.hpp"
 #include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace torsio {
+
+/// A flat plate that the flange of a simulated arm may hit. It carries no force along its face, and the arm's other
+/// parts pass through it.
+struct ArmPlate {
+  bool is_from_flange = true;  ///< `at_m` is measured from where the flange is when the step begins
+  Vector3 at_m = {};           ///< a point of its face, along the axes of the base
+  Vector3 normal = {0.0, 0.0, 1.0};  ///< out of its face, in the frame of the base, of length 1
+  double stiffness_N_m = 75e3;
+  double damping_Ns_m = 0.0;
+  double mass_kg =
+      0.0;  ///< 0: clamped; else it moves along its normal, without weight and friction
+};
 
 /// What an arm does in one step of its program.
 enum class ArmTask : std::uint8_t {
@@ -97,10 +108,11 @@ struct ArmRunSpec {
 struct ArmJointScore {
   std::string joint;
   std::string actuator;
-  std::optional<double> position_rmse_rad =
-      {};                         ///< the link in moves and holds; none: there are none
-  double torque_rmse_Nm = 0.0;    ///< on the link, estimated less true
-  double external_rmse_Nm = 0.0;  ///< external torque, estimated less true
+  /// The RMSE of the link in moves and holds; none: there were none after the first 0.5 s.
+  std::optional<double> position_rmse_rad = {};
+  /// The RMSE of the torque on the link; none: the run ended within the first 0.5 s.
+  std::optional<double> torque_rmse_Nm = {};
+  std::optional<double> external_rmse_Nm = {};
   double largest_torque_Nm = 0.0;
   double largest_share = 0.0;  ///< largest torque over the rating
   double limited_s = 0.0;      ///< how long a limit was in effect
@@ -111,8 +123,7 @@ struct ArmContact {
   double found_s = 0.0;
   std::string joint = {};
   ContactReaction reaction = ContactReaction::none;
-  std::optional<double> latency_s =
-      {};  ///< since it truly began; none: there was none, a false alarm
+  std::optional<double> latency_s = {};  ///< since it truly began; none: a false alarm
 };
 
 /// The force between flange and plate.

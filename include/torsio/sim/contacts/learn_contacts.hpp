@@ -32,10 +32,11 @@ struct LearnedContacts {
   std::vector<Joint> joints = {};
 };
 
-/// Moves the simulated arm at random without contacts (`ArmFreeMotion`). A tenth of `hours`, at least two minutes, is for
+/// Moves the simulated arm at random without contacts (`ArmFreeMotion`). A tenth of `hours`, at least six minutes, is for
 /// the coefficients of `ExternalTorqueError` (largest likelihood); then `hours` for the factors: the largest |τ_ext| / σ in
-/// blocks of 10 s has the tail of a generalised Pareto distribution, at most an exponential one, of which k is what is
-/// exceeded at the wanted rate divided by the number of joints, at least the largest one.
+/// blocks of 10 s has the tail of a generalised Pareto distribution, at most an exponential one. k is what is exceeded at a
+/// third of the wanted rate divided by the number of joints, since a threshold from the hours that just support a rate is
+/// exceeded about twice as often in other hours; it is at least the largest ratio of all blocks.
 /// @throws UsageError if hours are below 0.02 or above 1000, or do not support the rate: without a false alarm in T hours
 /// the rate is below 3 / T with 95 % confidence and nothing lower is known. Error if the arm stops; Cancelled.
 [[nodiscard]] LearnedContacts learn_contacts(const ArmSetup& setup, const ContactLearning& learning,
