@@ -4,6 +4,7 @@
 //
 //   JointEndpoint  the joint's side: bytes in, calls of a `LinkJoint` and its registers, frames out
 //   HostEndpoint   the host's side: messages to frames, bytes to messages, the joint's clock and the sequence of commands
+//   JointConnection  calls of a host that wait for the reply, for programs of a person
 //   RegisterTable  parameters and measured values with unit, range and access
 //   CommandGuard   accepts each command once, in order, young, and from one host
 //   NdlcomDecoder  frames of NDLCom from a stream of bytes; `encode_ndlcom` writes them
@@ -12,7 +13,9 @@
 #include "torsio/link/drive_state.hpp"
 #include "torsio/link/frame_counters.hpp"
 #include "torsio/link/host_endpoint.hpp"
+#include "torsio/link/joint_connection.hpp"
 #include "torsio/link/joint_endpoint.hpp"
+#include "torsio/link/joint_line.hpp"
 #include "torsio/link/line_budget.hpp"
 #include "torsio/link/link_messages.hpp"
 #include "torsio/link/link_transport.hpp"

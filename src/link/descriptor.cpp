@@ -22,6 +22,12 @@ void detail::refuse_system(const std::string& place, std::string_view problem, i
                .advice = std::string(advice)});
 }
 
+std::int64_t detail::monotonic_ns() noexcept {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
+}
+
 detail::OwnedPath::OwnedPath(std::string path) : path_(std::move(path)) {
   const std::string lock = path_ + ".lock";
   lock_ = Descriptor(::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));

@@ -36,6 +36,9 @@ class Descriptor {
 [[noreturn]] void refuse_system(const std::string& place, std::string_view problem,
                                 int error_number, std::string_view advice = {});
 
+/// CLOCK_MONOTONIC.
+[[nodiscard]] std::int64_t monotonic_ns() noexcept;
+
 /// A path of which one process at a time is the owner, by a lock on PATH.lock that the kernel ends with the process. What an
 /// earlier owner has left at the path may therefore be removed.
 class OwnedPath {

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <utility>
 
 #include "core/checks.hpp"
@@ -26,13 +25,6 @@ std::uint32_t checked_baud(const std::string& place, double baud) {
   require(baud >= kSlowest_baud && baud <= kFastest_baud && baud == std::floor(baud), place,
           fmt::format("a whole rate of {} to {} baud", kSlowest_baud, kFastest_baud), baud);
   return static_cast<std::uint32_t>(baud);
-}
-
-std::uint64_t monotonic_ns() noexcept {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::uint64_t>(now.tv_sec) * 1'000'000'000U +
-         static_cast<std::uint64_t>(now.tv_nsec);
 }
 
 /// Bytes to and from a descriptor. A frame that was begun is completed before the next.
@@ -133,7 +125,9 @@ class PseudoTerminal : public ByteLine {
   std::string place() const override { return link_.text().empty() ? device_ : link_.text(); }
 
  protected:
-  bool may_send(std::size_t bytes) noexcept override { return pace_.take(bytes, monotonic_ns()); }
+  bool may_send(std::size_t bytes) noexcept override {
+    return pace_.take(bytes, static_cast<std::uint64_t>(detail::monotonic_ns()));
+  }
 
  private:
   std::string device_;
