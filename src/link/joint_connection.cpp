@@ -197,6 +197,7 @@ void JointConnection::write(std::string_view name, const Value& value) {
 
 /// A try whose reply was lost may have been executed: then the state is already the wanted one.
 void JointConnection::change(LinkStateCommand command, LinkDriveState wanted) {
+  exchange_->forget_change();
   try {
     exchange_->command(LinkStateChange{.command = command}, torsio::name(command));
   } catch (const Error&) {

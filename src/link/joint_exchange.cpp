@@ -90,7 +90,7 @@ void JointConnection::Exchange::throw_silence(std::string_view what, bool is_com
 }
 
 void JointConnection::Exchange::store(const LinkTelemetry& telemetry) {
-  if (telemetry.mask != subscription_.mask) return;  // of a subscription before
+  if (telemetry.mask != subscription_.mask) return;  // an earlier subscription
   ++counts_.telemetry;
   if (has_sequence_ && telemetry.sequence > next_sequence_)
     counts_.lost += telemetry.sequence - next_sequence_;
@@ -147,7 +147,7 @@ void JointConnection::Exchange::heartbeat() {
   transmit(LinkStateChange{.command = LinkStateCommand::heartbeat});
 }
 
-/// Waits for the reply once only: nobody can be told in a destructor, and the watchdog has the same effect.
+/// A failure is ignored: a destructor cannot report it, and the watchdog has the same effect.
 void JointConnection::Exchange::release() noexcept {
   if (!has_control_) return;
   try {

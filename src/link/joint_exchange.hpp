@@ -95,6 +95,7 @@ class JointConnection::Exchange {
     return tries_ > 1 && refusal_ != LinkRefusal::none;
   }
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
+  void forget_change() noexcept { state_.reset(); }
   [[nodiscard]] const std::optional<LinkState>& last_change() const noexcept { return state_; }
   [[nodiscard]] const std::string& place() const noexcept { return place_; }
 
@@ -144,7 +145,7 @@ class JointConnection::Exchange {
   LinkSubscribe subscription_ = {};
   std::int64_t renewed_ns_ = 0;
   std::deque<LinkTelemetry> telemetry_ = {};
-  std::uint32_t next_sequence_ = 0;  ///< of the telemetry
+  std::uint32_t next_sequence_ = 0;  ///< the next one of the telemetry
   bool has_sequence_ = false;
   Counts counts_ = {};
   std::optional<LinkState> state_ = {};

@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <array>
-#include <type_traits>
+#include <cerrno>
+#include <chrono>
+#include <thread>
 
 #include "core/checks.hpp"
 #include "link/descriptor.hpp"
@@ -17,6 +19,8 @@ namespace torsio {
 namespace {
 
 constexpr std::uint8_t kLastJoint = 253;
+/// What 253 pings need at 115 200 baud.
+constexpr int kLongestQueue_ms = 400;
 
 /// The address of the interface through which the joints are reached: that of a socket which is connected to them.
 std::string own_address(const JointLine& line) {
@@ -38,14 +42,15 @@ std::string own_address(const JointLine& line) {
 }
 
 void ping_all(LinkTransport& line, std::uint8_t host_id) {
+  int waits = kLongestQueue_ms;
   for (std::uint8_t joint = 1; joint <= kLastJoint; ++joint) {
     if (joint == host_id) continue;
     HostEndpoint host({.id = host_id, .joint = joint});
     std::array<std::uint8_t, kNdlcomMaxEncodedBytes> frame;
     const std::size_t size = host.build(LinkPing{.token = joint}, frame);
     // A serial line takes a part of them at once; the others wait until there is space.
-    for (int tries = 0; tries < 100 && !line.send(std::span(frame).first(size)); ++tries)
-      static_cast<void>(line.wait(500'000));
+    while (!line.send(std::span(frame).first(size)) && waits-- > 0)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }
 

@@ -1,12 +1,11 @@
-// A joint and its host over a line that delays, reorders, drops, doubles, damages, splits and joins.
+// A joint and its host over a line that delays, reorders, drops, duplicates, damages, splits and joins.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <map>
-#include <utility>
-#include <vector>
+#include <array>
+#include <limits>
 
 #include "link/recording_joint.hpp"
+#include "torsio/link/hostile_wire.hpp"
 
 namespace torsio {
 namespace {
@@ -14,122 +13,119 @@ namespace {
 using test::LinkBytes;
 using test::LinkedJoint;
 
-/// Each direction of the line has one.
-class HostileLine {
- public:
-  explicit HostileLine(std::uint64_t seed) : random_(seed) {}
+constexpr std::uint64_t kWatchdog_ns = 50'000'000;
 
-  void send(LinkBytes bytes, std::uint64_t now_ns) {
-    if (random_.uniform() < 0.1) return;
-    if (random_.uniform() < 0.05)
-      bytes[random_.below(bytes.size())] ^= static_cast<std::uint8_t>(1U << random_.below(8));
-    if (random_.uniform() < 0.02) bytes.resize(random_.below(bytes.size()) + 1);
-    if (random_.uniform() < 0.02)
-      bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(random_.below(bytes.size())),
-                   bytes[0]);
-    for (std::size_t copies = random_.uniform() < 0.15 ? 2 : 1; copies > 0; --copies) {
-      const double delay_ms =
-          random_.uniform() < 0.1 ? random_.uniform(0.0, 200.0) : random_.uniform(0.0, 3.0);
-      arriving_.emplace(now_ns + static_cast<std::uint64_t>(1e6 * delay_ms), bytes);
-    }
-  }
-  /// What has arrived, joined, and cut in two at a random place.
-  std::pair<LinkBytes, LinkBytes> take(std::uint64_t now_ns) {
-    LinkBytes all = std::exchange(rest_, {});
-    for (; !arriving_.empty() && arriving_.begin()->first <= now_ns;
-         arriving_.erase(arriving_.begin()))
-      all.insert(all.end(), arriving_.begin()->second.begin(), arriving_.begin()->second.end());
-    const auto cut = all.begin() + static_cast<std::ptrdiff_t>(random_.below(all.size() + 1));
-    if (random_.uniform() < 0.3) {
-      rest_.assign(cut, all.end());
-      return {LinkBytes(all.begin(), cut), {}};
-    }
-    return {LinkBytes(all.begin(), cut), LinkBytes(cut, all.end())};
-  }
-
- private:
-  Random random_;
-  std::multimap<std::uint64_t, LinkBytes> arriving_ = {};
-  LinkBytes rest_ = {};
-};
-
-struct SentReference {
-  std::uint64_t heard_ns = 0;
-  std::uint64_t deadline_ns = 0;
-};
-
-/// One joint, driven by one host, whose references are numbers that rise.
+/// One joint, driven by one host, whose references carry their number: the line must not change, repeat or delay them.
 class HostileRun {
  public:
-  explicit HostileRun(std::uint64_t seed) : to_joint_(seed), to_host_(seed + 1000) {}
+  explicit HostileRun(std::uint64_t seed)
+      : random_(seed), to_joint_({}, seed + 1000), to_host_({}, seed + 2000) {}
 
   void tick(bool host_is_alive) {
     joint_.tick();
     const std::uint64_t now_ns = joint_.now_ns;
     if (!joint_.sent.bytes.empty()) to_host_.send(joint_.sent.take(), now_ns);
-    const auto [first, second] = to_joint_.take(now_ns);
-    joint_.endpoint.receive(first, now_ns);
-    joint_.endpoint.receive(second, now_ns);
-    check(now_ns);
-    const auto heard = to_host_.take(now_ns);
-    host_.receive(heard.first, [](const auto&) {});
-    host_.receive(heard.second, [](const auto&) {});
+    to_joint_.take(now_ns, [&](auto bytes) { joint_.endpoint.receive(bytes, now_ns); });
+    check_references(now_ns);
+    check_joint(now_ns);
+    to_host_.take(now_ns, [&](auto bytes) { host_.receive(bytes, [](const auto&) {}); });
     if (host_is_alive) drive(now_ns);
   }
 
   LinkedJoint joint_;
-  std::size_t executed_ = 0;
-  std::vector<SentReference> sent_ = {};
+  std::uint64_t executed_ = 0;
+  std::uint64_t enabled_ticks_ = 0;
 
  private:
+  struct Sent {
+    std::uint64_t number = std::numeric_limits<std::uint64_t>::max();
+    std::uint64_t heard_ns = 0;
+    std::uint64_t deadline_ns = 0;
+    float torque_Nm = 0.0F;
+  };
+  /// More than can be sent while a reference is young.
+  static constexpr std::uint64_t kKept = 4096;
+
   template <class Message>
   void send(const Message& message, std::uint64_t now_ns) {
-    LinkBytes frame(kNdlcomMaxEncodedBytes);
-    frame.resize(host_.build(message, frame));
-    to_joint_.send(std::move(frame), now_ns);
+    std::array<std::uint8_t, kNdlcomMaxEncodedBytes> frame;
+    to_joint_.send(std::span(frame).first(host_.build(message, frame)), now_ns);
+    sent_ns_ = now_ns;
   }
   void drive(std::uint64_t now_ns) {
     send(LinkPing{.token = ++token_}, now_ns);
     if (host_.clock_ns() == 0) return;
     if (token_ % 16 == 3) send(LinkStateChange{.command = LinkStateCommand::disable}, now_ns);
     if (token_ % 16 == 5) send(LinkStateChange{.command = LinkStateCommand::enable}, now_ns);
-    const std::uint64_t deadline_ns = host_.clock_ns() + 30'000'000;
-    send(LinkReference{.deadline_ns = deadline_ns,
+    if (token_ % 64 == 7)  // half of them are outside the limits
+      send(LinkRegisterWrite{.index = 0, .value = LinkValue::of(random_.uniform(-9.0, 18.0))},
+           now_ns);
+    const Sent made{.number = number_++,
+                    .heard_ns = host_.clock_ns(),
+                    .deadline_ns = host_.clock_ns() + 30'000'000,
+                    .torque_Nm = static_cast<float>(random_.uniform(-50.0, 60.0))};
+    kept_[made.number % kKept] = made;
+    send(LinkReference{.deadline_ns = made.deadline_ns,
                        .mode = JointMode::torque,
-                       .velocity_rad_s = static_cast<float>(sent_.size()),
-                       .torque_Nm = 1.0F},
+                       .position_rad = static_cast<float>(made.number / kKept),
+                       .velocity_rad_s = static_cast<float>(made.number % kKept),
+                       .torque_Nm = made.torque_Nm},
          now_ns);
-    sent_.push_back({host_.clock_ns(), deadline_ns});
   }
-  void check(std::uint64_t now_ns) {
-    const auto& references = joint_.joint.references;
-    for (; executed_ < references.size(); ++executed_) {
-      const auto number = static_cast<std::size_t>(references[executed_].velocity_rad_s);
-      ASSERT_LT(number, sent_.size()) << "never sent";
-      ASSERT_EQ(references[executed_].torque_Nm, 1.0) << "damaged";
+  void check_references(std::uint64_t now_ns) {
+    for (const JointReference& each : joint_.joint.references) {
+      const auto number = static_cast<std::uint64_t>(each.position_rad) * kKept +
+                          static_cast<std::uint64_t>(each.velocity_rad_s);
+      const Sent& sent = kept_[number % kKept];
+      ASSERT_EQ(sent.number, number) << "never sent, or long ago";
+      ASSERT_EQ(each.torque_Nm, double{sent.torque_Nm}) << "damaged";
+      ASSERT_LE(each.torque_Nm, 50.0) << "outside the limits";
       ASSERT_GE(number, next_) << "twice or out of order";
-      ASSERT_LT(now_ns, sent_[number].deadline_ns) << "late";
-      ASSERT_LT(now_ns - sent_[number].heard_ns, 50'000'000U) << "old";
+      ASSERT_LT(now_ns, sent.deadline_ns) << "late";
+      ASSERT_LT(now_ns - sent.heard_ns, kWatchdog_ns) << "old";
       next_ = number + 1;
+      ++executed_;
     }
+    joint_.joint.references.clear();
+    joint_.joint.stops.clear();
+  }
+  void check_joint(std::uint64_t now_ns) {
+    ASSERT_TRUE(joint_.gain >= 0.0 && joint_.gain <= 9.0) << "a register outside its limits";
+    if (!joint_.endpoint.drive().is_enabled()) return;
+    ++enabled_ticks_;
+    ASSERT_LT(now_ns - sent_ns_, kWatchdog_ns) << "enabled without a host";
   }
 
-  HostileLine to_joint_;
-  HostileLine to_host_;
+  Random random_;
+  HostileWire to_joint_;
+  HostileWire to_host_;
   HostEndpoint host_ = HostEndpoint({.id = 200, .joint = 1});
   std::uint32_t token_ = 0;
-  std::size_t next_ = 0;
+  std::uint64_t number_ = 0;
+  std::uint64_t next_ = 0;
+  std::uint64_t sent_ns_ = 0;
+  std::array<Sent, kKept> kept_ = {};
 };
+
+/// The host is silent for up to 0.3 s every 10 s. @param ticks of a millisecond
+void drive_for(HostileRun& run, std::uint64_t seed, std::uint64_t ticks) {
+  Random random(seed);
+  std::uint64_t silent = 0;
+  for (std::uint64_t n = 0; n < ticks && !testing::Test::HasFatalFailure(); ++n) {
+    if (n % 10'000 == 9'000) silent = random.below(300);
+    run.tick(silent == 0);
+    if (silent > 0) --silent;
+  }
+}
 
 TEST(HostileLine, NothingIsExecutedLateTwiceOrOutOfOrder) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     HostileRun run(seed);
-    for (int n = 0; n < 8000; ++n) {
-      run.tick(true);
-      if (testing::Test::HasFatalFailure()) return;
-    }
-    EXPECT_GT(run.executed_, 500U);
+    drive_for(run, seed, 30'000);
+    ASSERT_FALSE(HasFatalFailure());
+    EXPECT_GT(run.executed_, 2000U);
+    EXPECT_GT(run.enabled_ticks_, 5000U);
     const auto& guard = run.joint_.endpoint.guard();
     EXPECT_GT(guard.refused(CommandGuard::Refusal::repeated), 10U);
     EXPECT_GT(guard.refused(CommandGuard::Refusal::too_old), 10U);
@@ -148,6 +144,20 @@ TEST(HostileLine, ASilentHostStopsTheJointWithinTheTimeOfTheWatchdog) {
     EXPECT_FALSE(run.joint_.endpoint.drive().is_enabled());
   }
 }
+
+/// 24 simulated hours in eight parts.
+class HostileHours : public testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(HostileHours, NothingIsExecutedLateTwiceOrOutOfLimits) {
+  constexpr std::uint64_t kThreeHours = 3ULL * 3600 * 1000;
+  HostileRun run(GetParam());
+  drive_for(run, GetParam(), kThreeHours);
+  ASSERT_FALSE(HasFatalFailure());
+  EXPECT_GT(run.executed_, kThreeHours / 20);
+  RecordProperty("executed", std::to_string(run.executed_));
+}
+
+INSTANTIATE_TEST_SUITE_P(Parts, HostileHours, testing::Range<std::uint64_t>(101, 109));
 
 }  // namespace
 }  // namespace torsio

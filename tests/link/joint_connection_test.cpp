@@ -67,7 +67,7 @@ TEST_F(JointConnections, MistakesNameTheJointWhatWasSentAndTheReason) {
   host.enable();
   EXPECT_THAT(error_message([&] { host.write("ratio", 5.0); }),
               HasSubstr("Disable the joint first"));
-  JointConnection absent(JointLine{.unix_path = folder_.path("nobody")},
+  JointConnection absent(JointLine{.unix_path = folder_.path("absent")},
                          {.joint = 3, .timeout_s = 0.01});
   EXPECT_THAT(error_message([&] { absent.enable(); }),
               AllOf(HasSubstr("joint 3 at "), HasSubstr("no reply: enable"),
@@ -134,7 +134,7 @@ TEST_F(JointConnections, ASecondHostLearnsThatAnotherOneIsInControl) {
   EXPECT_EQ(std::get<double>(second.read("gain")), 2.0);
   EXPECT_THAT(error_message([&] { second.write("gain", 3.0); }),
               HasSubstr("another host is in control"));
-  second.stop(StopCategory::ramp_and_brake);  // of anyone
+  second.stop(StopCategory::ramp_and_brake);  // any host may stop a joint
   EXPECT_EQ(first.information().state, LinkDriveState::stop);
 }
 

@@ -124,7 +124,8 @@ class JointConnection {
   std::size_t poll(const VisitTelemetry& visit, double wait_s = 0.0);
 
   [[nodiscard]] const Counts& counts() const noexcept;
-  /// The last state that the joint sent: at each change, to the host that is or was in control.
+  /// The last change of the state that the joint made without a request since the last `enable`, `disable` or `reset_fault`,
+  /// such as a stop: the joint sends it to the host that is or was in control.
   [[nodiscard]] std::optional<LinkState> last_change() const noexcept;
   /// "joint 1 at 127.0.0.1:34001"
   [[nodiscard]] const std::string& place() const noexcept;

@@ -17,7 +17,7 @@ struct JointLine {
   /// The socket of the joints in the file system; that of this host is `<path>.host`.
   std::string unix_path = {};
   std::string serial = {};  ///< "/dev/ttyUSB0"
-  double baud = 921600.0;   ///< of the serial line
+  double baud = 921600.0;   ///< rate of the serial line
 };
 
 /// "127.0.0.1:34001", "/run/joint", "/dev/ttyUSB0": for messages.
