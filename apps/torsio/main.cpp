@@ -89,6 +89,7 @@ int run(int argc, char** argv) {
   add_track(app);
   add_tune_loop(app);
   add_design(app);
+  add_connect(app);
   add_reproduce(app);
   add_unpack(app);
   add_convert(app);

@@ -24,6 +24,7 @@ void add_track(CLI::App& app);
 void add_transfer(CLI::App& app);
 void add_tune_loop(CLI::App& app);
 void add_design(CLI::App& app);
+void add_connect(CLI::App& app);
 void add_reproduce(CLI::App& app);
 void add_unpack(CLI::App& app);
 void add_bench(CLI::App& app);
