@@ -122,7 +122,8 @@ JointConnection::Information JointConnection::information() {
 const std::vector<JointConnection::Register>& JointConnection::registers() {
   if (!registers_.empty()) return registers_;
   std::vector<Register> found(information().registers);
-  for (std::uint16_t index = 0; index < found.size(); ++index)
+  for (std::size_t n = 0; n < found.size(); ++n) {
+    const auto index = static_cast<std::uint16_t>(n);
     exchange_->ask(LinkRegisterDescribe{.index = index},
                    fmt::format("description of register {}", index),
                    [&](const LinkRegisterDescription& reply) {
@@ -138,6 +139,7 @@ const std::vector<JointConnection::Register>& JointConnection::registers() {
                                      .description = std::string(reply.description)};
                      return true;
                    });
+  }
   registers_ = std::move(found);
   return registers_;
 }

@@ -137,7 +137,6 @@ void JointConnection::Exchange::send(LinkReference reference, double valid_s) {
   reference.deadline_ns = host_.clock_ns() + static_cast<std::uint64_t>(age_ns) +
                           static_cast<std::uint64_t>(1e9 * valid_s);
   ++counts_.references;
-  has_control_ = true;
   transmit(reference);
 }
 

@@ -27,7 +27,8 @@ class JointConnection::Exchange {
   template <class Message, class Take>
   void ask(const Message& message, std::string_view what, const Take& take) {
     refusal_ = LinkRefusal::none;
-    for (tries_ = 1; tries_ <= settings_.tries; ++tries_) {
+    was_silent_ = false;
+    for (int attempt = 0; attempt < settings_.tries; ++attempt) {
       if constexpr (Message::kIsCommand)
         if (!refresh()) continue;
       bool is_done = false;
@@ -44,11 +45,11 @@ class JointConnection::Exchange {
               is_done = is_done || take(reply);
             }
           });
-      if (is_done) {
-        has_control_ = has_control_ || Message::kIsCommand;
-        return;
+      if (is_done) return;
+      if (!refused) {
+        was_silent_ = true;
+        continue;
       }
-      if (!refused) continue;
       refusal_ = refused->reason;
       if (!depends_on_the_line(refusal_)) throw_refusal(what, *refused);
       wait_until(
@@ -69,6 +70,8 @@ class JointConnection::Exchange {
     std::array<std::uint8_t, kNdlcomMaxEncodedBytes> frame;
     const std::size_t size = host_.build(message, frame);
     static_cast<void>(line_->send(std::span(frame).first(size)));
+    // Also a command that is refused may have given control to this host.
+    has_control_ = has_control_ || Message::kIsCommand;
   }
 
   void send(LinkReference reference, double valid_s);
@@ -92,7 +95,7 @@ class JointConnection::Exchange {
 
   /// Whether the last request was refused after a try that got no reply.
   [[nodiscard]] bool was_refused_when_repeated() const noexcept {
-    return tries_ > 1 && refusal_ != LinkRefusal::none;
+    return was_silent_ && refusal_ != LinkRefusal::none;
   }
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
   void forget_change() noexcept { state_.reset(); }
@@ -135,7 +138,7 @@ class JointConnection::Exchange {
   std::string place_;
   std::int64_t timeout_ns_;
   HostEndpoint host_;
-  int tries_ = 0;
+  bool was_silent_ = false;  ///< a try of the last request
   LinkRefusal refusal_ = LinkRefusal::none;
   bool has_heard_ = false;
   bool has_control_ = false;

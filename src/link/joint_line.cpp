@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint8_t kLastJoint = 253;
 /// What 253 pings need at 115 200 baud.
-constexpr int kLongestQueue_ms = 400;
+constexpr int kLongestQueueMs = 400;
 
 /// The address of the interface through which the joints are reached: that of a socket which is connected to them.
 std::string own_address(const JointLine& line) {
@@ -42,7 +42,7 @@ std::string own_address(const JointLine& line) {
 }
 
 void ping_all(LinkTransport& line, std::uint8_t host_id) {
-  int waits = kLongestQueue_ms;
+  int waits = kLongestQueueMs;
   for (std::uint8_t joint = 1; joint <= kLastJoint; ++joint) {
     if (joint == host_id) continue;
     HostEndpoint host({.id = host_id, .joint = joint});

@@ -63,7 +63,7 @@ TEST_F(Connect, ShowsRefusalsWithTheirReason) {
   refuses("set gain many", "a value of type float64");
   refuses("set gian 1", "Did you mean 'gain'?");
   refuses("get gain --joint 7 --timeout 10ms", "no reply");
-  refuses("reset --timeout 2s", "not_in_this_state");
+  refuses("reset", "not_in_this_state");
   refuses("fault freeze", "this joint does not offer it");
   refuses("watch --channels torque", "torque_Nm");
   EXPECT_EQ(connect("record -o missing/run.csv --for 0.1s").exit_code, kCallWasWrong);

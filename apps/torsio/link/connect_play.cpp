@@ -111,6 +111,7 @@ class PlayedReferences {
   [[noreturn]] static void refuse_mode(const torsio::Recording& recording,
                                        const std::string& mode) {
     std::vector<std::string> modes;
+    modes.reserve(kModes.size());
     for (const PlayMode& each : kModes)
       modes.push_back(fmt::format("{} ({})", each.channel, name(each.mode)));
     throw torsio::UsageError({.place = recording.name(),
