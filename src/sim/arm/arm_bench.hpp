@@ -43,6 +43,11 @@ class ArmBench {
   /// Advances to the next tick. @throws Error if the arm refuses.
   void act(std::span<const Command> commands, const ArmLoad& load);
 
+  /// Faults that are injected while it runs: first `FaultInjector::prepare`.
+  [[nodiscard]] FaultInjector& faults(std::size_t joint) noexcept {
+    joints_[joint].has_faults = true;
+    return joints_[joint].faults;
+  }
   [[nodiscard]] const ArmPlant& plant() const noexcept { return plant_; }
   /// From now on there is this plate.
   /// @param plate measured from the flange where it truly is, or in the frame of the base
