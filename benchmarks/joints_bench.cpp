@@ -20,6 +20,7 @@ namespace {
 constexpr std::uint8_t kJoints = 12;
 constexpr std::uint8_t kHost = 254;
 constexpr int kCycles = 10000;
+constexpr double kPeriod_s = 3e-4;  // shorter than a tick, which changes nothing for the joints
 constexpr std::uint64_t kTick_ns = 1'000'000;
 constexpr std::array kActuators = {"dfki-300", "dfki-300", "dfki-120",
                                    "dfki-50",  "dfki-28",  "dfki-28"};
@@ -31,10 +32,10 @@ class DrivenJoints {
     for (std::uint8_t n = 0; n < kJoints; ++n)
       hosts_.emplace_back(
           HostEndpoint::Settings{.id = kHost, .joint = static_cast<std::uint8_t>(n + 1)});
-    run(2);
+    run(100);
     for (HostEndpoint& host : hosts_)
       send(host, LinkSubscribe{.mask = 0x3FF, .rate_Hz = 1000.0F, .lifetime_s = 60.0F});
-    run(2);
+    run(100);
     for (HostEndpoint& host : hosts_)
       send(host, LinkStateChange{.command = LinkStateCommand::enable});
     for (int n = 0; n < 1000; ++n) {
@@ -46,7 +47,10 @@ class DrivenJoints {
 
   DurationHistogram drive() {
     cpu_time_ = {};
-    for (int n = 0; n < kCycles; ++n) {
+    // With the priority of the program's own loop, if that is permitted.
+    RealtimeLoop loop({.period_s = kPeriod_s});
+    int cycles = 0;
+    static_cast<void>(loop.run([&](const Tick&) noexcept {
       for (HostEndpoint& host : hosts_)
         send(host, LinkReference{.deadline_ns = host.clock_ns() + 40 * kTick_ns,
                                  .mode = JointMode::impedance,
@@ -54,7 +58,8 @@ class DrivenJoints {
                                  .stiffness_Nm_rad = 50.0F,
                                  .damping_Nms_rad = 5.0F});
       run(1);
-    }
+      return ++cycles < kCycles;
+    }));
     for (const auto& joint : server_.joints())
       if (joint.state != LinkDriveState::enabled) throw std::runtime_error("a joint has stopped");
     return cpu_time_;
@@ -75,12 +80,15 @@ class DrivenJoints {
 
   template <class Message>
   void send(HostEndpoint& host, const Message& message) {
-    std::array<std::uint8_t, kNdlcomMaxEncodedBytes> frame;
-    host_line_->send(std::span(frame).first(host.build(message, frame)));
+    if (bundled_ + kNdlcomMaxEncodedBytes > bundle_.size()) flush();
+    bundled_ += host.build(message, std::span(bundle_).subspan(bundled_));
   }
+  /// A datagram may carry several frames.
+  void flush() { host_line_->send(std::span(bundle_).first(std::exchange(bundled_, 0))); }
   void run(int cycles) {
     std::array<std::uint8_t, 2048> bytes;
     for (; cycles > 0; --cycles) {
+      if (bundled_ > 0) flush();
       const std::int64_t start_ns = clock_.cpu_ns();
       server_.cycle(now_ns_ += kTick_ns);
       cpu_time_.add(clock_.cpu_ns() - start_ns);
@@ -98,6 +106,8 @@ class DrivenJoints {
       open_udp({.listen = {.port = host_port_}, .peers = {{.port = joint_port_}}});
   JointServer server_{arms(), {}, *joint_line_};
   std::deque<HostEndpoint> hosts_;
+  std::array<std::uint8_t, 1400> bundle_ = {};
+  std::size_t bundled_ = 0;
   MonotonicClock clock_;
   DurationHistogram cpu_time_;
   std::uint64_t now_ns_ = std::uint64_t{1} << 41U;

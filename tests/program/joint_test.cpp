@@ -167,7 +167,7 @@ TEST_F(JointDaemon, DrivesAnArmOverUdp) {
     const std::string place = open_udp({.listen = {.port = 0}, .peers = {{.port = 9}}})->place();
     port = place.substr(place.find(':') + 1);
   }
-  start("--arm arm6 --rigid-gears --port " + ports[0] + " --host-port " + ports[1]);
+  start("--arm arm6 --port " + ports[0] + " --host-port " + ports[1]);
   const auto line =
       open_udp({.listen = {.port = static_cast<std::uint16_t>(std::stoi(ports[1]))},
                 .peers = {{.port = static_cast<std::uint16_t>(std::stoi(ports[0]))}}});

@@ -45,7 +45,7 @@ struct JointFlags {
   bool is_lenient = false;
   bool is_realtime = false;
   bool is_fast = false;
-  bool has_rigid_gears = false;
+  bool has_gear_stage = false;
   bool has_bare_loop = false;
   JsonOutput json;
 };
@@ -182,7 +182,7 @@ JointJson run_json(const JointFlags& flags, const Cycles& done, const torsio::Jo
   JointJson document{{"line", line.place},
                      {"fast", flags.is_fast},
                      {"seed", flags.seed},
-                     {"gear_stage", !flags.has_rigid_gears},
+                     {"gear_stage", flags.has_gear_stage},
                      {"cycles", done.cycles},
                      {"late_cycles", done.late},
                      {"skipped_cycles", done.skipped},
@@ -239,7 +239,7 @@ void run(const JointFlags& flags, const CLI::App& verb) {
       std::move(arms),
       {.watchdog_s = watchdog_s,
        .rules = flags.is_lenient ? torsio::NdlcomRules::lenient : torsio::NdlcomRules::strict,
-       .has_rigid_gears = flags.has_rigid_gears,
+       .has_gear_stage = flags.has_gear_stage,
        .seed = flags.seed},
       *transport);
   std::vector<std::string> start;
@@ -283,8 +283,9 @@ void add_joint(CLI::App& app) {
   verb->add_option("--duration", flags->duration, "end after this time (default: never)");
   add_seed(*verb, flags->seed, "seed of the sensors' noise");
   verb->add_flag(
-      "--rigid-gears", flags->has_rigid_gears,
-      "rotor and gear output turn together: faster, without the elasticity of the gears");
+      "--gear-stage", flags->has_gear_stage,
+      "with the elasticity of the gears, which takes twice the time; else rotor and gear "
+      "output turn together");
   verb->add_option("--json", flags->json.destination,
                    "write the summary as JSON to a file, or - for standard output");
   verb->callback([flags, verb] { run(*flags, *verb); });

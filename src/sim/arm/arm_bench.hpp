@@ -28,9 +28,10 @@ class ArmBench {
 
   /// At rest at these angles, the brakes closed.
   /// @param faults one schedule per joint, or none
+  /// @param longest_step_s of the integration, or shorter where the arm requires it; 0: that of `ArmPlant`
   /// @throws Error as `ArmPlant` does, UsageError as `FaultInjector`.
   ArmBench(const ArmSetup& setup, FirstStageForm form, std::span<const FaultSchedule> faults,
-           std::uint64_t seed, std::span<const double> start_rad);
+           std::uint64_t seed, std::span<const double> start_rad, double longest_step_s = 0.0);
 
   /// The signals of all joints at this tick, including faults.
   void sense();

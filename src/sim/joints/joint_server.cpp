@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <deque>
 #include <numeric>
 #include <utility>
@@ -33,6 +34,33 @@ std::uint64_t total_refused(const JointEndpoint& endpoint) noexcept {
   return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
 }
 
+/// Frames of one tick that a datagram carries together: on the way into the system each costs as much as twenty frames here.
+/// A line with a limited rate gets each frame by itself, since it may take one and not the next.
+class FrameBundle : public LinkSink {
+ public:
+  explicit FrameBundle(LinkTransport& transport)
+      : transport_(transport), is_bundling_(std::isinf(transport.line_B_s())) {}
+
+  bool send(std::span<const std::uint8_t> frame) noexcept override {
+    if (!is_bundling_) return transport_.send(frame);
+    const bool fits = size_ + frame.size() <= bytes_.size();
+    const bool is_sent = fits || flush();
+    std::ranges::copy(frame, bytes_.begin() + static_cast<std::ptrdiff_t>(size_));
+    size_ += frame.size();
+    return is_sent;
+  }
+  bool flush() noexcept {
+    if (size_ == 0) return true;
+    return transport_.send(std::span(bytes_).first(std::exchange(size_, 0)));
+  }
+
+ private:
+  LinkTransport& transport_;
+  bool is_bundling_;
+  std::size_t size_ = 0;
+  std::array<std::uint8_t, 1400> bytes_ = {};  ///< no fragments on Ethernet
+};
+
 }  // namespace
 
 class JointServer::Parts {
@@ -46,6 +74,7 @@ class JointServer::Parts {
   std::deque<ServedJoint> joints;  ///< stay where they are
   LineStatus line = {};
   LinkTransport& transport;
+  FrameBundle bundle;
   NdlcomDecoder decoder;
 
  private:
@@ -75,10 +104,8 @@ class JointServer::Parts {
 
 JointServer::Parts::Parts(std::vector<ServedArm> served, const Settings& settings,
                           LinkTransport& line_transport)
-    : transport(line_transport), decoder(settings.rules) {
+    : transport(line_transport), bundle(line_transport), decoder(settings.rules) {
   require(!served.empty(), kServerPlace, "at least one joint", "none");
-  const FirstStageForm form =
-      settings.has_rigid_gears ? FirstStageForm::rigid : FirstStageForm::elastic;
   Random seeds(settings.seed);
   std::size_t count = 0;
   for (const ServedArm& arm : served) count += arm.setup.joints.size();
@@ -86,7 +113,8 @@ JointServer::Parts::Parts(std::vector<ServedArm> served, const Settings& setting
   std::vector<ModelUpload*> uploads;
   for (ServedArm& arm : served) {
     const std::uint8_t first_id = arm.first_id;
-    arms.push_back(std::make_unique<LinkedArm>(std::move(arm), form, seeds.bits()));
+    arms.push_back(
+        std::make_unique<LinkedArm>(std::move(arm), settings.has_gear_stage, seeds.bits()));
     add(*arms.back(), first_id, settings, line_B_s);
   }
   for (ServedJoint& each : joints) uploads.push_back(&each.joint->upload());
@@ -114,7 +142,7 @@ void JointServer::Parts::add(LinkedArm& arm, std::uint8_t first_id, const Settin
                                                   .tick_rate_Hz = kBenchRate_Hz,
                                                   .rules = settings.rules,
                                                   .line_B_s = line_B_s},
-                          *made.joint, *made.table, transport);
+                          *made.joint, *made.table, bundle);
   }
 }
 
@@ -122,6 +150,7 @@ void JointServer::Parts::cycle(std::uint64_t now_ns) noexcept {
   for (auto& arm : arms) arm->sense();
   for (ServedJoint& each : joints) each.endpoint->tick(now_ns);
   receive(now_ns);
+  static_cast<void>(bundle.flush());  // the transport counts what it does not take
   for (auto& arm : arms) arm->control();
   note_events();
   ++tick_;

@@ -12,6 +12,9 @@ namespace {
 /// After this time without power taken over by the motors, the arm stops.
 constexpr std::uint32_t kLongestRelease_ticks = 2000;
 
+/// Without the stiff stage of the gear longer steps suffice.
+constexpr double kRigidStep_s = 2.5e-4;
+
 std::vector<double> start_angles(const ArmModel& arm) {
   std::vector<double> start_rad;
   for (const ArmJoint& joint : arm.joints)
@@ -21,15 +24,24 @@ std::vector<double> start_angles(const ArmModel& arm) {
   return start_rad;
 }
 
+FirstStageForm form_of(const ArmSetup& setup, bool has_gear_stage) {
+  const bool slips = std::ranges::any_of(setup.joints, [](const ArmJointSetup& joint) {
+    return std::holds_alternative<ClutchSheet>(joint.sheet.first);
+  });
+  return has_gear_stage || slips ? FirstStageForm::elastic : FirstStageForm::rigid;
+}
+
 bool is_fault(ArmStopCause cause) noexcept {
   return cause != ArmStopCause::none && cause != ArmStopCause::requested;
 }
 
 }  // namespace
 
-LinkedArm::LinkedArm(ServedArm arm, FirstStageForm form, std::uint64_t seed)
+LinkedArm::LinkedArm(ServedArm arm, bool has_gear_stage, std::uint64_t seed)
     : arm_(std::move(arm)),
-      bench_(arm_.setup, form, arm_.faults, seed, start_angles(arm_.setup.arm)),
+      bench_(arm_.setup, form_of(arm_.setup, has_gear_stage), arm_.faults, seed,
+             start_angles(arm_.setup.arm),
+             form_of(arm_.setup, has_gear_stage) == FirstStageForm::rigid ? kRigidStep_s : 0.0),
       controller_(arm_controller_settings(arm_.setup), kBenchRate_Hz),
       samples_(arm_.setup.joints.size()),
       commands_(arm_.setup.joints.size()) {

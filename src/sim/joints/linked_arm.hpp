@@ -19,8 +19,9 @@ namespace torsio {
 /// one joint stops all of them; they can be enabled again when all are at rest and every joint was disabled.
 class LinkedArm {
  public:
-  /// @throws Error as `ArmBench` and `arm_controller_settings`, or if the actuator of an arm is not series-elastic.
-  LinkedArm(ServedArm arm, FirstStageForm form, std::uint64_t seed);
+  /// @param has_gear_stage as `JointServer::Settings`; a clutch is always one that slips
+  /// @throws Error as `ArmBench` and `arm_controller_settings`.
+  LinkedArm(ServedArm arm, bool has_gear_stage, std::uint64_t seed);
   LinkedArm(const LinkedArm&) = delete;
   LinkedArm& operator=(const LinkedArm&) = delete;
 

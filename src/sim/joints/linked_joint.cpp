@@ -222,11 +222,6 @@ void LinkedJoint::measure(std::span<float> values) const noexcept {
 
 JointSample LinkedJoint::zeroed(const JointSample& sample) noexcept {
   JointSample zeroed = sample;
-  // A torsion tube before a gear is a spring whose both angles are referred to the joint.
-  if (const auto* const gear = std::get_if<GearSheet>(&sheet_.second)) {
-    zeroed.gear_angle_rad = sample.motor_angle_rad / drive_.ratio;
-    zeroed.joint_angle_rad = sample.gear_angle_rad / gear->ratio.value;
-  }
   zeroed.motor_angle_rad -= zero_.motor_angle_rad;
   zeroed.gear_angle_rad -= zero_.gear_angle_rad;
   zeroed.joint_angle_rad -= zero_.joint_angle_rad;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/checks.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -17,6 +18,12 @@ constexpr Matrix3 kHanging = {0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0};
 }  // namespace
 
 ArmSetup single_joint_setup(const DataSheet& sheet, const SingleLink& link) {
+  if (sheet.family == ActuatorFamily::harmonic_drive)
+    throw UsageError({.place = "joint with " + full_name(sheet),
+                      .expected = "an actuator with its spring at the output",
+                      .found = "a torsion tube before its last gear",
+                      .advice = "Its impedance is controlled by another controller: torsio track "
+                                "--impedance."});
   require_positive(kLinkPlace, "its length [m]", link.length_m);
   const double mass_kg = link.mass_kg.value_or(kDefaultWeightShare * sheet.rating.torque_Nm.value /
                                                (kGravity_m_s2 * link.length_m));
@@ -29,7 +36,7 @@ ArmSetup single_joint_setup(const DataSheet& sheet, const SingleLink& link) {
                           .inertia_kg_m2 = {inertia_kg_m2, inertia_kg_m2, inertia_kg_m2}},
                  .lowest_rad = -kSingleJointRange_rad,
                  .highest_rad = kSingleJointRange_rad,
-                 .speed_rad_s = sheet.rating.speed_rad_s.value,
+                 .speed_rad_s = speed_limit_of(sheet),
                  .effort_Nm = sheet.rating.torque_Nm.value};
   if (!link.has_vertical_axis) joint.origin.rotation = kHanging;
   ArmSetup setup{.arm = {.name = full_name(sheet), .joints = {joint}},

@@ -32,8 +32,9 @@ class JointServer {
   struct Settings {
     double watchdog_s = 0.05;
     NdlcomRules rules = NdlcomRules::strict;
-    bool has_rigid_gears = false;  ///< rotor and gear output turn together: faster
-    std::uint64_t seed = 1;        ///< of the sensors' noise
+    /// With the elasticity of the gears, which takes twice the time: else rotor and gear output turn together.
+    bool has_gear_stage = false;
+    std::uint64_t seed = 1;  ///< of the sensors' noise
   };
   /// What a joint is, and what has happened to it.
   struct JointStatus {

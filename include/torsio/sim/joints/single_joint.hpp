@@ -20,7 +20,8 @@ inline constexpr double kDefaultWeightShare = 0.25;
 inline constexpr double kSingleJointRange_rad = 2.8;
 
 /// A joint without an arm, as an arm of one joint. With a horizontal axis the link hangs down at angle 0.
-/// @throws Error if mass or length is not positive, or the weight above `kLargestStaticShare` of the rated torque
+/// @throws UsageError for an actuator with a torsion tube before its last gear, which `JointController` does not control;
+/// Error if mass or length is not positive, or the weight above `kLargestStaticShare` of the rated torque
 [[nodiscard]] ArmSetup single_joint_setup(const DataSheet& sheet, const SingleLink& link = {});
 
 }  // namespace torsio
