@@ -109,6 +109,8 @@ constexpr std::array kBenches{
     Bench{"link_decode_bytewise", link_decode_bytewise},
     Bench{"link_decode_escapes", link_decode_escapes},
     Bench{"link_round_trip", link_round_trip},
+    Bench{"joints_cycle", joints_cycle},
+    Bench{"joints_cycle_p999", joints_cycle_p999},
     Bench{"redundancy_step", redundancy_step},
     Bench{"monitor_step", monitor_step},
 };

@@ -81,6 +81,8 @@ Row link_decode();
 Row link_decode_bytewise();
 Row link_decode_escapes();
 Row link_round_trip();
+Row joints_cycle();
+Row joints_cycle_p999();
 Row redundancy_step();
 Row monitor_step();
 

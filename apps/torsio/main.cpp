@@ -74,6 +74,7 @@ int run(int argc, char** argv) {
   add_demo(app);
   add_simulate(app);
   add_arm(app);
+  add_joint(app);
   add_check(app);
   add_fit(app);
   add_evaluate(app);

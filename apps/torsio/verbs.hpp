@@ -7,6 +7,7 @@
 /// 2 the call was wrong).
 void add_simulate(CLI::App& app);
 void add_arm(CLI::App& app);
+void add_joint(CLI::App& app);
 void add_check(CLI::App& app);
 void add_fit(CLI::App& app);
 void add_drift(CLI::App& app);

@@ -219,6 +219,13 @@ void JointEndpoint::tick(std::uint64_t now_ns) noexcept {
     joint_.disable();
     send_state(last_host_, now_ns);
   }
+  const LinkStateReason own_stop = joint_.own_stop();
+  if (own_stop != LinkStateReason::none && drive_.is_enabled()) {
+    guard_.watch(false);
+    drive_.stop(own_stop);
+    send_state(last_host_, now_ns);
+  }
+  poll_upload();
   send_telemetry(now_ns);
 }
 

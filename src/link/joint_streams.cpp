@@ -15,8 +15,8 @@ std::uint32_t channel_mask(std::size_t channels) noexcept {
   return channels >= 32 ? ~std::uint32_t{0} : (std::uint32_t{1} << channels) - 1U;
 }
 
-std::uint32_t file_crc(std::span<const std::uint8_t> file) noexcept {
-  return static_cast<std::uint32_t>(crc32_z(0, file.data(), file.size()));
+std::uint32_t continued_crc(std::uint32_t crc, std::span<const std::uint8_t> bytes) noexcept {
+  return static_cast<std::uint32_t>(crc32_z(crc, bytes.data(), bytes.size()));
 }
 
 }  // namespace
@@ -122,6 +122,7 @@ LinkRefusal JointEndpoint::reply_upload(Context& context, LinkRefusal refusal) n
 }
 
 LinkRefusal JointEndpoint::execute(const LinkUploadBegin& message, Context& context) noexcept {
+  if (upload_.is_checked) return reply_upload(context, LinkRefusal::not_in_this_state);
   upload_ = {};
   if (message.size == 0) return reply_upload(context, LinkRefusal::upload_rejected);
   const std::span<std::uint8_t> space = joint_.begin_upload(message.size, message.actuator);
@@ -142,24 +143,47 @@ LinkRefusal JointEndpoint::execute(const LinkUploadChunk& message, Context& cont
                        message.data.size() <= upload_.space.size() - upload_.received;
   if (!is_next) return reply_upload(context, LinkRefusal::upload_out_of_order);
   std::memcpy(upload_.space.data() + upload_.received, message.data.data(), message.data.size());
+  upload_.received_crc = continued_crc(upload_.received_crc, message.data);
   upload_.received += static_cast<std::uint32_t>(message.data.size());
   if (upload_.received == upload_.space.size()) upload_.state = LinkUploadState::complete;
   return reply_upload(context, LinkRefusal::none);
 }
 
 LinkRefusal JointEndpoint::execute(const LinkUploadCommit& message, Context& context) noexcept {
+  if (upload_.is_checked) return reply_upload(context, LinkRefusal::not_in_this_state);
   if (upload_.state != LinkUploadState::complete)
     return reply_upload(context, LinkRefusal::upload_out_of_order);
-  LinkRefusal refusal = LinkRefusal::upload_rejected;
-  if (message.crc == upload_.crc && file_crc(upload_.space) == upload_.crc)
-    refusal = joint_.commit_upload(upload_.space);
+  std::optional<LinkRefusal> result = LinkRefusal::upload_rejected;
+  if (message.crc == upload_.crc && upload_.received_crc == upload_.crc) {
+    result = joint_.commit_upload(upload_.space);
+    if (result == LinkRefusal::none) result = joint_.poll_upload();
+  }
+  upload_.host = context.route.sender;
+  if (result) end_upload(*result);
+  upload_.is_checked = !result;
+  return reply_upload(context, result.value_or(LinkRefusal::none));
+}
+
+void JointEndpoint::end_upload(LinkRefusal result) noexcept {
   upload_.state =
-      refusal == LinkRefusal::none ? LinkUploadState::committed : LinkUploadState::rejected;
+      result == LinkRefusal::none ? LinkUploadState::committed : LinkUploadState::rejected;
   upload_.space = {};
-  return reply_upload(context, refusal);
+  upload_.is_checked = false;
+}
+
+/// Not a reply to a message: the check has lasted longer than the message of the commit.
+void JointEndpoint::poll_upload() noexcept {
+  if (!upload_.is_checked) return;
+  const std::optional<LinkRefusal> result = joint_.poll_upload();
+  if (!result) return;
+  end_upload(*result);
+  if (*result != LinkRefusal::none) ++counts_.refused[static_cast<std::size_t>(*result)];
+  send(upload_.host,
+       LinkUpload{.state = upload_.state, .refusal = *result, .received = upload_.received});
 }
 
 LinkRefusal JointEndpoint::execute(const LinkUploadAbort& /*message*/, Context& context) noexcept {
+  if (upload_.is_checked) return reply_upload(context, LinkRefusal::not_in_this_state);
   upload_ = {};
   return reply_upload(context, LinkRefusal::none);
 }

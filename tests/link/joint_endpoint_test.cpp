@@ -380,5 +380,55 @@ TEST(JointEndpoint, RefusesImpossibleSettings) {
               HasSubstr("an id that is not that of the joint, found 3 for both"));
 }
 
+TEST_F(AJointOnALine, ReportsLaterWhetherItUsesWhatItHasToCheck) {
+  const std::string file(100, 'm');
+  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(file.data());
+  const auto crc = static_cast<std::uint32_t>(crc32_z(0, bytes, file.size()));
+  const auto ask = [&](const auto& message) {
+    line_.ping(host_);
+    return *line_.ask<LinkUpload>(host_, message);
+  };
+  for (const LinkRefusal result : {LinkRefusal::none, LinkRefusal::upload_rejected}) {
+    line_.joint.upload_result.reset();
+    ASSERT_EQ(ask(LinkUploadBegin{.size = 100, .crc = crc, .actuator = "dfki-50"}).state,
+              LinkUploadState::receiving);
+    EXPECT_EQ(ask(LinkUploadChunk{.offset = 0, .data = {bytes, 100}}).state,
+              LinkUploadState::complete);
+    const LinkUpload checked = ask(LinkUploadCommit{.crc = crc});
+    EXPECT_EQ(checked.state, LinkUploadState::complete);
+    EXPECT_EQ(checked.refusal, LinkRefusal::none);
+    for (const LinkRefusal refusal :
+         {ask(LinkUploadBegin{.size = 100, .crc = crc, .actuator = "dfki-50"}).refusal,
+          ask(LinkUploadCommit{.crc = crc}).refusal, ask(LinkUploadAbort{}).refusal})
+      EXPECT_EQ(refusal, LinkRefusal::not_in_this_state) << "the joint reads the space";
+    line_.tick(3);
+    EXPECT_FALSE(line_.received<LinkUpload>(host_));
+    line_.joint.upload_result = result;
+    line_.tick();
+    const auto reply = line_.received<LinkUpload>(host_);
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->refusal, result);
+    EXPECT_EQ(reply->state,
+              result == LinkRefusal::none ? LinkUploadState::committed : LinkUploadState::rejected);
+    line_.tick();
+    EXPECT_FALSE(line_.received<LinkUpload>(host_)) << "once";
+  }
+}
+
+TEST_F(AJointOnALine, StopsWithItsArm) {
+  line_.joint.stopped_by = LinkStateReason::joint_fault;
+  line_.tick();
+  EXPECT_EQ(line_.endpoint.drive().state(), LinkDriveState::ready) << "it was not enabled";
+  line_.joint.stopped_by = LinkStateReason::none;
+  enable();
+  line_.joint.stopped_by = LinkStateReason::joint_fault;
+  line_.tick();
+  EXPECT_EQ(line_.endpoint.drive().state(), LinkDriveState::stop);
+  const auto state = line_.received<LinkState>(host_);
+  ASSERT_TRUE(state);
+  EXPECT_EQ(state->reason, LinkStateReason::joint_fault);
+  EXPECT_THAT(line_.joint.stops, IsEmpty()) << "it stops by itself";
+}
+
 }  // namespace
 }  // namespace torsio

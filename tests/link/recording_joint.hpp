@@ -25,6 +25,7 @@ class RecordingJoint : public LinkJoint {
   bool is_initialised() const noexcept override { return initialised; }
   bool is_at_rest() const noexcept override { return at_rest; }
   bool has_fault() const noexcept override { return fault; }
+  LinkStateReason own_stop() const noexcept override { return stopped_by; }
   LinkRefusal enable() noexcept override {
     enables += 1;
     return enable_objection;
@@ -58,10 +59,13 @@ class RecordingJoint : public LinkJoint {
     model.assign(file.begin(), file.end());
     return LinkRefusal::none;
   }
+  std::optional<LinkRefusal> poll_upload() noexcept override { return upload_result; }
 
   bool initialised = true;
   bool at_rest = true;
   bool fault = false;
+  LinkStateReason stopped_by = LinkStateReason::none;
+  std::optional<LinkRefusal> upload_result = LinkRefusal::none;
   LinkRefusal enable_objection = LinkRefusal::none;
   int enables = 0;
   int disables = 0;

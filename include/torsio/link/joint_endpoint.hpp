@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -43,6 +44,8 @@ class LinkJoint {
   [[nodiscard]] virtual bool is_initialised() const noexcept = 0;
   [[nodiscard]] virtual bool is_at_rest() const noexcept = 0;
   [[nodiscard]] virtual bool has_fault() const noexcept = 0;
+  /// Why an enabled joint stops without a message to it, as after the stop of another joint of its arm; `none`: it does not.
+  [[nodiscard]] virtual LinkStateReason own_stop() const noexcept { return LinkStateReason::none; }
 
   /// From now on current may flow; until the first reference the joint holds its present position. @returns `none` or why not
   virtual LinkRefusal enable() noexcept = 0;
@@ -71,10 +74,13 @@ class LinkJoint {
                                                std::string_view /*actuator*/) noexcept {
     return {};
   }
-  /// Every byte is in the space, and its CRC-32 is right. @returns `none`: the joint uses it from now on
+  /// Every byte is in the space, and its CRC-32 is right. @returns `none`: the result is that of `poll_upload`
   virtual LinkRefusal commit_upload(std::span<const std::uint8_t> /*file*/) noexcept {
     return LinkRefusal::not_supported;
   }
+  /// Is called after a commit, then in every tick, until there is a result. @returns nothing while the joint checks the file;
+  /// `none`: the joint uses it from now on; else why not
+  virtual std::optional<LinkRefusal> poll_upload() noexcept { return LinkRefusal::none; }
 };
 
 /// The joint's side of the link: bytes in, calls of a `LinkJoint`, frames out. No heap, thread, file or clock of its own; the
@@ -115,6 +121,10 @@ class JointEndpoint {
   /// Bytes from the line; frames may be split or joined.
   /// @param now_ns clock of the joint: monotonic, and as `CommandGuard` requires
   void receive(std::span<const std::uint8_t> bytes, std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+  /// A frame of a line that several joints share, decoded once for all of them.
+  void receive(const NdlcomFrame& frame, std::uint64_t now_ns) noexcept TORSIO_REALTIME {
+    take(frame, now_ns);
+  }
   /// Once per tick of the joint, after its measurements: watchdog, faults, telemetry.
   void tick(std::uint64_t now_ns) noexcept TORSIO_REALTIME;
 
@@ -138,7 +148,10 @@ class JointEndpoint {
     LinkUploadState state = LinkUploadState::idle;
     std::span<std::uint8_t> space = {};
     std::uint32_t received = 0;
-    std::uint32_t crc = 0;
+    std::uint32_t crc = 0;           ///< that was announced
+    std::uint32_t received_crc = 0;  ///< of what has been received
+    std::uint8_t host = 0;           ///< that has committed it
+    bool is_checked = false;         ///< the joint checks it: `poll_upload`
   };
   /// A message that is being executed.
   struct Context {
@@ -187,6 +200,8 @@ class JointEndpoint {
   LinkRefusal reply_upload(Context& context, LinkRefusal refusal) noexcept;
   LinkRefusal subscribe(const LinkSubscribe& message, Context& context,
                         LinkSubscription& reply) noexcept;
+  void end_upload(LinkRefusal result) noexcept;
+  void poll_upload() noexcept;
   void send_telemetry(std::uint64_t now_ns) noexcept;
 
   Settings settings_;
