@@ -3,7 +3,7 @@
     from torsio import link
 
     with link.RemoteJoint(3, host="192.168.2.10") as joint:
-        joint["torque_limit_Nm"] = 20.0
+        joint["largest_torque_Nm"] = 20.0
         joint.subscribe(["torque_Nm"], rate_Hz=1000)
         joint.enable()
         for _ in range(1000):

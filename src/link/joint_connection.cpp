@@ -97,9 +97,7 @@ JointConnection::JointConnection(std::shared_ptr<LinkTransport> line, const std:
                                  const Settings& settings)
     : exchange_(std::make_unique<Exchange>(std::move(line), place, settings)) {}
 
-JointConnection::~JointConnection() {
-  if (exchange_) exchange_->release();
-}
+JointConnection::~JointConnection() = default;
 JointConnection::JointConnection(JointConnection&&) noexcept = default;
 JointConnection& JointConnection::operator=(JointConnection&&) noexcept = default;
 
@@ -265,18 +263,20 @@ void JointConnection::upload(std::span<const std::uint8_t> file, const std::stri
     if (progress) progress(static_cast<double>(at) / static_cast<double>(file.size()));
   }
   const auto is_over = [&last] {
-    return last.refusal != LinkRefusal::none || last.state == LinkUploadState::committed ||
-           last.state == LinkUploadState::rejected;
+    return last.state == LinkUploadState::committed || last.state == LinkUploadState::rejected ||
+           (last.refusal != LinkRefusal::none && last.refusal != LinkRefusal::not_in_this_state);
   };
   exchange_->ask(LinkUploadCommit{.crc = crc}, "commit of an upload", [&](const LinkUpload& reply) {
     last = reply;
     return true;
   });
-  exchange_->wait_until(
-      static_cast<std::int64_t>(1e9 * kLongestCommit_s), is_over, [&](const auto& reply) {
-        if constexpr (std::is_same_v<std::remove_cvref_t<decltype(reply)>, LinkUpload>)
-          last = reply;
-      });
+  // While the joint checks the file it refuses another commit, and afterwards replies with the result.
+  for (int second = 0; !is_over() && second < kLongestCommit_s; ++second) {
+    exchange_->wait_until(1'000'000'000, is_over, [&](const auto& reply) {
+      if constexpr (std::is_same_v<std::remove_cvref_t<decltype(reply)>, LinkUpload>) last = reply;
+    });
+    if (!is_over()) exchange_->transmit(LinkUploadCommit{.crc = crc});
+  }
   if (last.state == LinkUploadState::committed) return;
   if (last.refusal == LinkRefusal::none) last.refusal = LinkRefusal::upload_rejected;
   check("commit of an upload");

@@ -20,6 +20,9 @@ namespace torsio {
 class JointConnection::Exchange {
  public:
   Exchange(std::shared_ptr<LinkTransport> line, const std::string& place, const Settings& settings);
+  ~Exchange() { release(); }
+  Exchange(const Exchange&) = delete;
+  Exchange& operator=(const Exchange&) = delete;
 
   /// Sends a request until `take(reply)`, which is called with each message of its type, returns true.
   /// @param what for messages: "write of gain"
@@ -76,7 +79,6 @@ class JointConnection::Exchange {
 
   void send(LinkReference reference, double valid_s);
   void heartbeat();
-  void release() noexcept;
   void renew(const LinkSubscribe& subscription);
   std::size_t poll(const VisitTelemetry& visit, double wait_s);
 
@@ -120,12 +122,18 @@ class JointConnection::Exchange {
     has_heard_ = true;
     if constexpr (std::is_same_v<Heard, LinkTelemetry>) store(message);
     if constexpr (std::is_same_v<Heard, LinkState>) state_ = message;
-    if constexpr (std::is_same_v<Heard, LinkRefused>)
+    if constexpr (std::is_same_v<Heard, LinkRefused>) {
       if (message.message == LinkReference::kId)
         ++counts_.refused[static_cast<std::size_t>(message.reason)];
+      // Also of a ping, without which no command is sent.
+      if (message.reason == LinkRefusal::wrong_version ||
+          message.reason == LinkRefusal::wrong_length)
+        refusal_ = message.reason;
+    }
     if constexpr (std::is_same_v<Heard, LinkPong> || std::is_same_v<Heard, LinkTelemetry>)
       heard_ns_ = detail::monotonic_ns();
   }
+  void release() noexcept;
   void store(const LinkTelemetry& telemetry);
   [[nodiscard]] bool refresh();
   void keep_young();

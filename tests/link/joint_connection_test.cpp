@@ -3,10 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "link/served_joint.hpp"
 #include "support/error_message.hpp"
@@ -152,6 +155,38 @@ TEST_F(JointConnections, AFileIsUploadedInPartsAlsoIfRepliesAreLost) {
   EXPECT_THAT(error_message([&] { host.upload(file, "other", {}); }),
               AllOf(HasSubstr("begin of an upload"), HasSubstr("upload_rejected"),
                     HasSubstr("for the actuator of this joint")));
+}
+
+/// A joint of another release, which refuses every layout.
+class OtherRelease : public LinkTransport {
+ public:
+  std::size_t receive(std::span<std::uint8_t> out) noexcept override {
+    std::ranges::copy(replies_, out.begin());
+    return std::exchange(replies_, {}).size();
+  }
+  bool send(std::span<const std::uint8_t> frame) noexcept override {
+    while (const auto request = decoder_.next(frame)) {
+      test::LinkBytes payload(kNdlcomMaxPayloadBytes);
+      payload.resize(encode_payload(
+          LinkRefused{.message = request->payload[0], .reason = LinkRefusal::wrong_version},
+          {.receiver = 254, .sender = 1}, payload));
+      replies_ = test::encoded({.receiver = 254, .sender = 1, .payload = payload});
+    }
+    return true;
+  }
+  int descriptor() const noexcept override { return -1; }
+  std::string place() const override { return "line"; }
+
+ private:
+  NdlcomDecoder decoder_;
+  test::LinkBytes replies_ = {};
+};
+
+TEST(JointConnectionToAnotherRelease, StatesThatTheLayoutsDiffer) {
+  JointConnection host(std::make_shared<OtherRelease>(), "line", {.timeout_s = 0.01});
+  const auto advice = HasSubstr("Host and joint have different releases of torsio");
+  EXPECT_THAT(error_message([&] { static_cast<void>(host.information()); }), advice);
+  EXPECT_THAT(error_message([&] { host.enable(); }), advice);
 }
 
 TEST_F(JointConnections, JointsAreFoundByTheirReply) {

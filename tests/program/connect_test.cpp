@@ -199,5 +199,60 @@ TEST_F(Connect, IsCompletedInAShell) {
   EXPECT_EQ(shell(complete + "play --va 3").out, "--valid\n");
 }
 
+/// `torsio connect` with `torsio joint`. Its watchdog is long, since the machine may be busy.
+class ConnectToDaemon : public Program {
+ protected:
+  /// Runs shell commands while a joint is served on the socket `joint`; in them T is the program.
+  Outcome with_joint(const std::string& commands) {
+    return shell("T=" + std::string(TORSIO_PROGRAM) +
+                 "; $T joint dfki-50 --watchdog 1s --unix joint >joint.txt 2>&1 & DAEMON=$!; "
+                 "T=" +
+                 TORSIO_PROGRAM +
+                 "; trap \"kill $DAEMON\" EXIT; "
+                 "until [ -S joint ]; do sleep 0.05; done; " +
+                 commands);
+  }
+  Json document(const std::string& file) { return Json::parse(contents(file), nullptr, false); }
+};
+
+constexpr const char* kMove = "t_s,position_rad\n0,0\n0.5,0.05\n1,0.1\n1.5,0.1\n";
+
+TEST_F(ConnectToDaemon, MovesAJointAndRecordsIt) {
+  folder_.file("move.csv", kMove);
+  const Outcome outcome = with_joint(
+      "$T connect describe --unix joint --json described.json && "
+      "$T connect set largest_torque_Nm 30 --unix joint && "
+      "$T connect play move.csv --valid 1s -o run.csv --unix joint --json played.json && "
+      "$T convert run.csv -o run.mcap");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err << contents("joint.txt");
+  EXPECT_EQ(document("described.json")["actuator"], "dfki-50");
+  EXPECT_EQ(document("played.json")["mode"], "position");
+  EXPECT_TRUE(document("played.json")["refused"].empty()) << contents("played.json");
+  EXPECT_THAT(contents("run.csv"), HasSubstr("gear_angle_rad"));
+}
+
+TEST_F(ConnectToDaemon, AJointWhoseHostIsKilledStops) {
+  folder_.file("move.csv", "t_s,position_rad\n0,0\n60,0.1\n");
+  const Outcome outcome = with_joint(
+      "$T connect play move.csv --valid 1s --unix joint & PLAY=$!; sleep 1; kill -9 $PLAY; sleep "
+      "2; "
+      "$T connect describe --unix joint --json described.json");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err << contents("joint.txt");
+  EXPECT_EQ(document("described.json")["state"], "stop");
+  EXPECT_THAT(contents("joint.txt"), HasSubstr("host_lost"));
+}
+
+TEST_F(ConnectToDaemon, ThroughAHostileProxyItMovesOrStops) {
+  folder_.file("move.csv", kMove);
+  const Outcome outcome = with_joint(
+      "$T connect proxy --unix joint --listen-unix hostile >proxy.txt 2>&1 & PROXY=$!; "
+      "until [ -S hostile ]; do sleep 0.05; done; "
+      "$T connect play move.csv --valid 0.1s --unix hostile --json played.json; kill -INT $PROXY; "
+      "wait $PROXY; cat proxy.txt");
+  EXPECT_THAT(outcome.out, HasSubstr("to the joints: ")) << outcome.err;
+  const Json played = document("played.json");
+  if (!played.is_discarded()) EXPECT_GT(played["references"], 100);
+}
+
 }  // namespace
 }  // namespace torsio::test

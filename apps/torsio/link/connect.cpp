@@ -40,6 +40,12 @@ Json json_of(const JointConnection::Information& joint, std::uint8_t id) {
           {"watchdog_s", joint.watchdog_s}};
 }
 
+/// With the digits that a table has space for.
+std::string short_text(const JointConnection::Value& value) {
+  const double* const number = std::get_if<double>(&value);
+  return number == nullptr ? torsio::text_of(value) : fmt::format("{:.6g}", *number);
+}
+
 std::string range_text(const JointConnection::Register& each) {
   const bool is_number =
       each.type != torsio::LinkValueType::boolean && each.type != torsio::LinkValueType::text;
@@ -80,7 +86,7 @@ void describe(const RegisterFlags& flags) {
   Json registers = Json::array();
   for (const JointConnection::Register& each : connection.registers()) {
     const auto value = connection.read(each.name);
-    table.row({each.name, torsio::text_of(value), each.unit, std::string(name(each.type)),
+    table.row({each.name, short_text(value), each.unit, std::string(name(each.type)),
                std::string(name(each.access)), range_text(each), each.description});
     registers.push_back({{"name", each.name},
                          {"value", json_of(value)},
@@ -152,7 +158,7 @@ void add_describe(CLI::App& connect) {
 void add_get(CLI::App& connect) {
   auto flags = std::make_shared<RegisterFlags>();
   CLI::App* verb = connect.add_subcommand("get", "read registers");
-  verb->footer("Example: torsio connect get torque_limit_Nm watchdog_s --joint 3");
+  verb->footer("Example: torsio connect get largest_torque_Nm watchdog_s --joint 3");
   verb->add_option("NAME", flags->names, "registers of torsio connect describe")->required();
   flags->add(*verb);
   verb->callback([flags] { get(*flags); });
@@ -161,7 +167,7 @@ void add_get(CLI::App& connect) {
 void add_set(CLI::App& connect) {
   auto flags = std::make_shared<RegisterFlags>();
   CLI::App* verb = connect.add_subcommand("set", "write a register, and read it again");
-  verb->footer("Example: torsio connect set torque_limit_Nm 20 --joint 3");
+  verb->footer("Example: torsio connect set largest_torque_Nm 20 --joint 3");
   verb->add_option("NAME", flags->name, "register of torsio connect describe")->required();
   verb->add_option("VALUE", flags->value, "in the unit of the register; true or false; a text")
       ->required();

@@ -57,8 +57,8 @@ CLI::App* add_command(CLI::App& connect, const char* word, const char* help, con
 
 void upload(const CommandFlags& flags, JointConnection& connection) {
   const std::vector<std::byte> bytes = torsio::read_whole_file(flags.file, kLargestModel_B);
-  ProgressBar bar;
-  const auto progress = bar.listener();
+  ProgressBar shown;
+  const auto progress = shown.listener();
   connection.upload({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()},
                     flags.actuator.empty() ? connection.information().actuator : flags.actuator,
                     [&](double fraction) {

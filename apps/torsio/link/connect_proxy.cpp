@@ -103,8 +103,7 @@ void add_share(CLI::App& verb, const char* option, double& share, const char* he
 void add_connect_proxy(CLI::App& connect) {
   auto flags = std::make_shared<ProxyFlags>();
   CLI::App* verb = connect.add_subcommand(
-      "proxy",
-      "stand between hosts and joints, and delay, reorder, drop and damage frames: for tests");
+      "proxy", "delay, reorder, drop and damage the frames between hosts and joints: for tests");
   verb->footer(
       "Example: torsio connect proxy --listen-port 34101 --reply-port 34100 &\n"
       "         torsio connect describe --port 34101 --host-port 34100");

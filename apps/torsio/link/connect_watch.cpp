@@ -125,9 +125,9 @@ void record(const TelemetryFlags& flags) {
   const TelemetryFile::Summary summary = file.close();
   remark(fmt::format("{}: {} samples of {} channels at {:g} Hz{}", flags.output,
                      summary.frames + summary.missing, summary.channels.size(), summary.rate_Hz,
-                     summary.missing == 0
-                         ? std::string()
-                         : fmt::format(", {} of which were lost and are nan", summary.missing)));
+                     summary.missing == 0 ? std::string()
+                                          : fmt::format(", {} of which did not arrive, and are nan",
+                                                        summary.missing)));
   flags.json.write(torsio::json_text(Json{{"samples", summary.frames + summary.missing},
                                           {"missing", summary.missing},
                                           {"channels", summary.channels},

@@ -24,7 +24,7 @@ class HostileWire {
     double truncated = 0.02;      ///< its end is lost
     double lengthened = 0.02;     ///< a byte is inserted
     double usual_delay_s = 3e-3;  ///< at most
-    double slow = 0.1;            ///< of those that remain
+    double slow = 0.1;            ///< delayed by up to longest_delay_s, so that others overtake it
     double longest_delay_s = 0.2;
     double split = 0.3;  ///< that an end of what has arrived comes with the next
   };
