@@ -74,7 +74,7 @@ class JointLoop {
       stopped_at_ = cycle_;
     }
     if (!stopped_at_ || cycle_ == *stopped_at_) return true;
-    return !server_.is_at_rest() && cycle_ < *stopped_at_ + kLongestStop_cycles;
+    return !server_.is_off() && cycle_ < *stopped_at_ + kLongestStop_cycles;
   }
   void request_end() noexcept { is_end_requested_.store(true); }
 

@@ -244,8 +244,8 @@ void JointServer::stop_all(StopCategory category) noexcept {
   for (auto& arm : parts_->arms) arm->stop(category);
 }
 
-bool JointServer::is_at_rest() const noexcept {
-  return std::ranges::all_of(parts_->arms, [](const auto& arm) { return arm->is_at_rest(); });
+bool JointServer::is_off() const noexcept {
+  return std::ranges::all_of(parts_->arms, [](const auto& arm) { return arm->is_off(); });
 }
 
 std::vector<std::string> JointServer::take_events() { return parts_->take_events(); }

@@ -87,6 +87,13 @@ void LinkedArm::act() noexcept {
   }
 }
 
+bool LinkedArm::is_off() const noexcept {
+  return output().is_at_rest &&
+         std::ranges::all_of(std::span(output().joints).first(size()), [](const auto& joint) {
+           return joint.phase == JointStop::Phase::off;
+         });
+}
+
 bool LinkedArm::may_enable() const noexcept {
   return is_sensed() && !is_broken_ && !is_started_ && stop_reason_ == LinkStateReason::none &&
          is_at_rest();

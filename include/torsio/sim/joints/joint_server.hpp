@@ -67,8 +67,8 @@ class JointServer {
   void cycle(std::uint64_t now_ns) noexcept TORSIO_REALTIME;
   /// Begins a stop of all joints, as if a host had requested it.
   void stop_all(StopCategory category) noexcept TORSIO_REALTIME;
-  /// All drives, measured. By the thread of `cycle`.
-  [[nodiscard]] bool is_at_rest() const noexcept TORSIO_REALTIME;
+  /// All joints are at rest, without power and with their brakes. By the thread of `cycle`.
+  [[nodiscard]] bool is_off() const noexcept TORSIO_REALTIME;
 
   /// What has happened since the last call, in words, a line each: control, states, models, refused frames. By one other
   /// thread than that of `cycle`.
