@@ -56,7 +56,7 @@ struct Cycles {
   std::uint64_t late = 0;     ///< ended after the next had begun
   std::uint64_t skipped = 0;  ///< periods without a cycle, because of them
   torsio::DurationHistogram cpu_time = {};
-  std::optional<std::uint64_t> bare_late = {};  ///< of a loop without work in the same time
+  std::optional<std::uint64_t> bare_late = {};  ///< late cycles of a loop without work
 };
 
 /// The cycle with its end: after the duration or a request all joints stop, and the last cycle is that in which they rest.

@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint32_t kLongestRelease_ticks = 2000;
 
 /// Without the stiff stage of the gear longer steps suffice.
-constexpr double kRigidStep_s = 2.5e-4;
+constexpr double kRigidStep_s = 5e-4;
 
 std::vector<double> start_angles(const ArmModel& arm) {
   std::vector<double> start_rad;

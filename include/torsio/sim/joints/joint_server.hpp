@@ -34,7 +34,7 @@ class JointServer {
     NdlcomRules rules = NdlcomRules::strict;
     /// With the elasticity of the gears, which takes twice the time: else rotor and gear output turn together.
     bool has_gear_stage = false;
-    std::uint64_t seed = 1;  ///< of the sensors' noise
+    std::uint64_t seed = 1;  ///< for the noise of the sensors
   };
   /// What a joint is, and what has happened to it.
   struct JointStatus {
