@@ -117,10 +117,10 @@ Cycles run_fast(const JointFlags& flags, torsio::JointServer& server, JointLoop&
 }
 
 Cycles run_realtime(const JointFlags& flags, torsio::JointServer& server, JointLoop& loop) {
-  torsio::RealtimeLoop realtime({.period_s = 1e-9 * kCycle_ns});
-  torsio::RealtimeLoop bare({.period_s = 1e-9 * kCycle_ns});
   torsio::MonotonicClock clock;
   std::atomic<bool> has_ended = false;
+  torsio::RealtimeLoop bare({.period_s = 1e-9 * kCycle_ns});
+  torsio::RealtimeLoop realtime({.period_s = 1e-9 * kCycle_ns});  // last: it uses the others
   if (flags.has_bare_loop) bare.start([](const torsio::Tick&) noexcept { return true; });
   realtime.start([&](const torsio::Tick&) noexcept {
     const bool continues = loop.step(static_cast<std::uint64_t>(clock.now_ns()));

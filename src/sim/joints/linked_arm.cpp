@@ -136,7 +136,12 @@ void LinkedArm::find_faults() noexcept {
     stop_reason_ = LinkStateReason::joint_fault;
   }
   last_cause_ = output().cause;
-  for (std::size_t j = 0; j < size(); ++j) joints_[j]->end_fault(output().is_at_rest);
+  for (auto& joint : joints_) {
+    joint->end_fault(output().is_at_rest);
+    if (!joint->is_lost()) continue;
+    joint->found_fault();
+    if (is_started_) stop_reason_ = LinkStateReason::joint_fault;
+  }
 }
 
 // The stop is over when no joint is enabled any more: then all may be enabled again.

@@ -86,6 +86,10 @@ class LinkedJoint final : public LinkJoint {
   [[nodiscard]] JointSample zeroed(const JointSample& sample) noexcept TORSIO_REALTIME;
   /// What it follows in this tick. @param is_ready the arm follows references
   [[nodiscard]] JointReference reference(bool is_ready) noexcept TORSIO_REALTIME;
+  /// Its signals are missing for longer than the controller tolerates.
+  [[nodiscard]] bool is_lost() const noexcept {
+    return lost_ > kToleratedLosses;
+  }
   /// The arm has found a fault in it.
   void found_fault() noexcept TORSIO_REALTIME { fault_ticks_ = kShortestFault_ticks; }
   /// A fault ends when its cause has ended and the arm is at rest.
@@ -123,6 +127,7 @@ class LinkedJoint final : public LinkJoint {
 
  private:
   static constexpr std::uint32_t kShortestFault_ticks = 10;
+  static constexpr std::uint32_t kToleratedLosses = 3;  ///< as `ArmController::Settings`
 
   [[nodiscard]] bool is_in_range(const JointReference& reference) const noexcept;
   [[nodiscard]] std::optional<JointReference> present(JointMode mode) const noexcept;
