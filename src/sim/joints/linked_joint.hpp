@@ -87,9 +87,7 @@ class LinkedJoint final : public LinkJoint {
   /// What it follows in this tick. @param is_ready the arm follows references
   [[nodiscard]] JointReference reference(bool is_ready) noexcept TORSIO_REALTIME;
   /// Its signals are missing for longer than the controller tolerates.
-  [[nodiscard]] bool is_lost() const noexcept {
-    return lost_ > kToleratedLosses;
-  }
+  [[nodiscard]] bool is_lost() const noexcept { return lost_ > kToleratedLosses; }
   /// The arm has found a fault in it.
   void found_fault() noexcept TORSIO_REALTIME { fault_ticks_ = kShortestFault_ticks; }
   /// A fault ends when its cause has ended and the arm is at rest.
