@@ -273,9 +273,9 @@ void ArmController::estimate(std::span<const JointSample> samples) noexcept {
     } else {
       torque.value = axis.stiffness_Nm_rad * sample.spring_deflection_rad();
       if (!std::isfinite(torque.value))
-        torque = {.value = output_.joints[j].torque.value + axis.torque_zero_Nm -
-                           axis.transfer.pending(),
-                  .fault = Fault::input_not_finite};
+        torque = {
+            .value = output_.joints[j].torque.value + axis.torque_zero_Nm - axis.transfer.pending(),
+            .fault = Fault::input_not_finite};
     }
     torque.value -= axis.torque_zero_Nm;
     if (std::exchange(axis.is_exchanged, false)) {

@@ -56,7 +56,7 @@ struct Cycles {
   std::uint64_t late = 0;     ///< ended after the next had begun
   std::uint64_t skipped = 0;  ///< periods without a cycle, because of them
   torsio::DurationHistogram cpu_time = {};
-  std::optional<std::uint64_t> bare_late = {};  ///< of a loop without work in the same time
+  std::optional<std::uint64_t> bare_late = {};  ///< late cycles of a loop without work
 };
 
 /// The cycle with its end: after the duration or a request all joints stop, and the last cycle is that in which they rest.
@@ -74,7 +74,7 @@ class JointLoop {
       stopped_at_ = cycle_;
     }
     if (!stopped_at_ || cycle_ == *stopped_at_) return true;
-    return !server_.is_at_rest() && cycle_ < *stopped_at_ + kLongestStop_cycles;
+    return !server_.is_off() && cycle_ < *stopped_at_ + kLongestStop_cycles;
   }
   void request_end() noexcept { is_end_requested_.store(true); }
 
@@ -117,10 +117,10 @@ Cycles run_fast(const JointFlags& flags, torsio::JointServer& server, JointLoop&
 }
 
 Cycles run_realtime(const JointFlags& flags, torsio::JointServer& server, JointLoop& loop) {
-  torsio::RealtimeLoop realtime({.period_s = 1e-9 * kCycle_ns});
-  torsio::RealtimeLoop bare({.period_s = 1e-9 * kCycle_ns});
   torsio::MonotonicClock clock;
   std::atomic<bool> has_ended = false;
+  torsio::RealtimeLoop bare({.period_s = 1e-9 * kCycle_ns});
+  torsio::RealtimeLoop realtime({.period_s = 1e-9 * kCycle_ns});  // last: it uses the others
   if (flags.has_bare_loop) bare.start([](const torsio::Tick&) noexcept { return true; });
   realtime.start([&](const torsio::Tick&) noexcept {
     const bool continues = loop.step(static_cast<std::uint64_t>(clock.now_ns()));

@@ -148,7 +148,7 @@ class ArmController {
     double external_std_Nm = kNotMeasured;  ///< its standard deviation, if contacts are looked for
     double speed_rad_s = 0.0;               ///< measured, of the link
     JointStop::Phase phase = JointStop::Phase::running;
-    double thermal_load = 0.0;  ///< of the winding: 0 cold, 1 as hot as it may be
+    double thermal_load = 0.0;  ///< heat of the winding: 0 cold, 1 as hot as it may be
     JointCascade::Limit limit = JointCascade::Limit::none;
     Fault fault = Fault::none;
   };
@@ -216,7 +216,8 @@ class ArmController {
   /// difference decays in 0.1 s.
   /// @param model on return the one before
   /// @returns false, and nothing changes, for a joint with a monitor
-  [[nodiscard]] bool exchange_model(std::size_t joint, ArmJointModel& model) noexcept TORSIO_REALTIME;
+  [[nodiscard]] bool exchange_model(std::size_t joint,
+                                    ArmJointModel& model) noexcept TORSIO_REALTIME;
   /// Subtracts this torque [Nm] from a joint's estimate from the next step on.
   void set_torque_zero(std::size_t joint, double torque_Nm) noexcept TORSIO_REALTIME {
     joints_[joint].torque_zero_Nm = torque_Nm;
@@ -235,7 +236,7 @@ class ArmController {
     JointController<ExchangeableInverse> controller;
     JointStop stop;
     std::optional<TorqueEstimator> estimator;
-    detail::BumplessTransfer transfer;  ///< of the torque, from one model to another
+    detail::BumplessTransfer transfer;  ///< difference of the torques of two models
     bool is_exchanged = false;          ///< the model, since the last step
     double torque_zero_Nm = 0.0;
     std::optional<MonitoredTorque> monitored;

@@ -38,7 +38,9 @@ class ExchangeableInverse {
     last_rad_ = wanted.value;
     return wanted;
   }
-  void follow(double asked_rad) noexcept TORSIO_REALTIME { inverse_.follow(asked_rad - added_rad_); }
+  void follow(double asked_rad) noexcept TORSIO_REALTIME {
+    inverse_.follow(asked_rad - added_rad_);
+  }
 
  private:
   AnyInverse inverse_;

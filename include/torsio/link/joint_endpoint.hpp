@@ -149,7 +149,7 @@ class JointEndpoint {
     std::span<std::uint8_t> space = {};
     std::uint32_t received = 0;
     std::uint32_t crc = 0;           ///< that was announced
-    std::uint32_t received_crc = 0;  ///< of what has been received
+    std::uint32_t received_crc = 0;  ///< CRC-32 of what has been received
     std::uint8_t host = 0;           ///< that has committed it
     bool is_checked = false;         ///< the joint checks it: `poll_upload`
   };

@@ -34,7 +34,7 @@ class FaultInjector {
     FaultKind kind = FaultKind::freeze;
     double Measurement::*value = nullptr;
     bool Measurement::*is_fresh = nullptr;
-    double PlantCondition::*factor = nullptr;  ///< of a part; null: a stop
+    double PlantCondition::*factor = nullptr;  ///< what a fault of a part changes; null: a stop
     double start_s = 0.0;
     double end_s = std::numeric_limits<double>::infinity();
     double amount = 0.0;  ///< in the unit of the measurement

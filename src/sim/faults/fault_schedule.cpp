@@ -85,9 +85,9 @@ bool FaultInjector::inject(const Injection& injection) noexcept {
                faults.end());
   if (faults.size() == faults.capacity()) return false;
   faults.push_back({.kind = injection.kind,
-                            .window = window,
-                            .amount = injection.amount,
-                            .next_s = window.start_s});
+                    .window = window,
+                    .amount = injection.amount,
+                    .next_s = window.start_s});
   return true;
 }
 
@@ -108,10 +108,10 @@ void FaultInjector::add_sensor_fault(const ScheduledFault& fault, const Window& 
   if (fault.kind == FaultKind::wrap) amount = 2.0 * std::numbers::pi * fault.amount;
   ++sensor.scheduled;
   sensor.faults.push_back({.kind = fault.kind,
-                            .window = window,
-                            .amount = amount,
-                            .every_s = fault.every_s,
-                            .next_s = window.start_s});
+                           .window = window,
+                           .amount = amount,
+                           .every_s = fault.every_s,
+                           .next_s = window.start_s});
 }
 
 void FaultInjector::reset() noexcept {

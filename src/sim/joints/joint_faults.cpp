@@ -8,7 +8,7 @@
 namespace torsio {
 namespace {
 
-/// As `common_part_name`: the part of a fault whose name is that of its part, or stands for one.
+/// As `common_part_name`; empty for a fault of a sensor.
 std::string_view part_of(std::string_view fault) noexcept {
   if (fault == "break" || fault == "bottom") return "spring";
   return fault == "friction" || fault == "torque-constant" ? fault : std::string_view{};

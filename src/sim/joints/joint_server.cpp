@@ -83,7 +83,6 @@ class JointServer::Parts {
     LinkDriveState state = LinkDriveState::initialising;
     std::uint8_t host = 0;
     std::uint64_t refused = 0;
-    std::uint64_t at_tick = 0;
   };
 
   void add(LinkedArm& arm, std::uint8_t first_id, const Settings& settings, double line_B_s);
@@ -196,11 +195,11 @@ void JointServer::Parts::note_events() noexcept {
       note(k, ServerEvent::state, static_cast<double>(state),
            static_cast<double>(endpoint.drive().reason()));
     }
-    if (tick_ < last.at_tick + kRefusedEvery_ticks) continue;
+    // Once per second, one joint after the other.
+    if (tick_ % kRefusedEvery_ticks != k) continue;
     if (const std::uint64_t refused = total_refused(endpoint); refused != last.refused) {
       note(k, ServerEvent::refused, static_cast<double>(refused - last.refused), 0.0);
       last.refused = refused;
-      last.at_tick = tick_;
     }
   }
 }
@@ -244,8 +243,8 @@ void JointServer::stop_all(StopCategory category) noexcept {
   for (auto& arm : parts_->arms) arm->stop(category);
 }
 
-bool JointServer::is_at_rest() const noexcept {
-  return std::ranges::all_of(parts_->arms, [](const auto& arm) { return arm->is_at_rest(); });
+bool JointServer::is_off() const noexcept {
+  return std::ranges::all_of(parts_->arms, [](const auto& arm) { return arm->is_off(); });
 }
 
 std::vector<std::string> JointServer::take_events() { return parts_->take_events(); }

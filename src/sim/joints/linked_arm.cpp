@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint32_t kLongestRelease_ticks = 2000;
 
 /// Without the stiff stage of the gear longer steps suffice.
-constexpr double kRigidStep_s = 2.5e-4;
+constexpr double kRigidStep_s = 5e-4;
 
 std::vector<double> start_angles(const ArmModel& arm) {
   std::vector<double> start_rad;
@@ -87,6 +87,13 @@ void LinkedArm::act() noexcept {
   }
 }
 
+bool LinkedArm::is_off() const noexcept {
+  return output().is_at_rest &&
+         std::ranges::all_of(std::span(output().joints).first(size()), [](const auto& joint) {
+           return joint.phase == JointStop::Phase::off;
+         });
+}
+
 bool LinkedArm::may_enable() const noexcept {
   return is_sensed() && !is_broken_ && !is_started_ && stop_reason_ == LinkStateReason::none &&
          is_at_rest();
@@ -129,7 +136,12 @@ void LinkedArm::find_faults() noexcept {
     stop_reason_ = LinkStateReason::joint_fault;
   }
   last_cause_ = output().cause;
-  for (std::size_t j = 0; j < size(); ++j) joints_[j]->end_fault(output().is_at_rest);
+  for (auto& joint : joints_) {
+    joint->end_fault(output().is_at_rest);
+    if (!joint->is_lost()) continue;
+    joint->found_fault();
+    if (is_started_) stop_reason_ = LinkStateReason::joint_fault;
+  }
 }
 
 // The stop is over when no joint is enabled any more: then all may be enabled again.

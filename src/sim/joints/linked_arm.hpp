@@ -44,6 +44,8 @@ class LinkedArm {
   /// Why all joints have to stop; `none`: they have not.
   [[nodiscard]] LinkStateReason stop_reason() const noexcept { return stop_reason_; }
   [[nodiscard]] bool is_at_rest() const noexcept { return output().is_at_rest; }
+  /// At rest, without power and with its brakes.
+  [[nodiscard]] bool is_off() const noexcept;
   /// The brakes open or are open: references are accepted.
   [[nodiscard]] bool is_running() const noexcept {
     return is_started_ && !is_release_wanted_ && output().cause == ArmStopCause::none;

@@ -11,7 +11,6 @@
 namespace torsio {
 namespace {
 
-constexpr std::uint32_t kToleratedLosses = 3;  // as `ArmController::Settings::tolerated_losses`
 /// A new model runs in parallel with the one in use until its filters and memory have settled.
 constexpr std::uint32_t kTrial_ticks = 500;
 
@@ -227,7 +226,6 @@ JointSample LinkedJoint::zeroed(const JointSample& sample) noexcept {
   zeroed.joint_angle_rad -= zero_.joint_angle_rad;
   const bool is_measured = std::isfinite(zeroed.motor_angle_rad + zeroed.spring_deflection_rad());
   lost_ = is_measured ? 0 : lost_ + 1;
-  if (lost_ > kToleratedLosses) found_fault();
   return zeroed;
 }
 

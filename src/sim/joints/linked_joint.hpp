@@ -59,7 +59,7 @@ class LinkedJoint final : public LinkJoint {
   LinkedJoint(LinkedArm& arm, std::size_t index, const DataSheet& sheet, const ArmJoint& joint,
               const ArmController::Joint& settings, std::string model);
 
-  // Of `LinkJoint`.
+  // The functions of `LinkJoint`.
   [[nodiscard]] Identity identity() const noexcept override;
   [[nodiscard]] bool is_initialised() const noexcept override;
   [[nodiscard]] bool is_at_rest() const noexcept override;
@@ -86,11 +86,13 @@ class LinkedJoint final : public LinkJoint {
   [[nodiscard]] JointSample zeroed(const JointSample& sample) noexcept TORSIO_REALTIME;
   /// What it follows in this tick. @param is_ready the arm follows references
   [[nodiscard]] JointReference reference(bool is_ready) noexcept TORSIO_REALTIME;
+  /// Its signals are missing for longer than the controller tolerates.
+  [[nodiscard]] bool is_lost() const noexcept { return lost_ > kToleratedLosses; }
   /// The arm has found a fault in it.
   void found_fault() noexcept TORSIO_REALTIME { fault_ticks_ = kShortestFault_ticks; }
   /// A fault ends when its cause has ended and the arm is at rest.
   void end_fault(bool has_ended) noexcept TORSIO_REALTIME;
-  /// Once per tick, with the torque that the controller wants.
+  /// Once per tick, after the controller: the uploaded model runs in parallel, and is then used.
   void try_model() noexcept TORSIO_REALTIME;
 
   // For its registers and the server.
@@ -112,7 +114,7 @@ class LinkedJoint final : public LinkJoint {
   LinkRefusal set_limits(const Limits& limits) noexcept TORSIO_REALTIME;
   [[nodiscard]] const JointCascade::Gains& gains() const noexcept { return gains_; }
   LinkRefusal set_gains(const JointCascade::Gains& gains) noexcept TORSIO_REALTIME;
-  /// Of the impedance until a reference has its own.
+  /// Stiffness and damping of the impedance until a reference has its own.
   struct Impedance {
     double stiffness_Nm_rad = 0.0;
     double damping_Nms_rad = 0.0;
@@ -123,6 +125,7 @@ class LinkedJoint final : public LinkJoint {
 
  private:
   static constexpr std::uint32_t kShortestFault_ticks = 10;
+  static constexpr std::uint32_t kToleratedLosses = 3;  ///< as `ArmController::Settings`
 
   [[nodiscard]] bool is_in_range(const JointReference& reference) const noexcept;
   [[nodiscard]] std::optional<JointReference> present(JointMode mode) const noexcept;
@@ -134,7 +137,7 @@ class LinkedJoint final : public LinkJoint {
   std::string serial_;
   Drive drive_;
   double stiffness_Nm_rad_;
-  double wound_rad_;  ///< of the spring at the largest torque
+  double wound_rad_;  ///< deflection at the largest torque
   double highest_damping_Nms_rad_;
   Limits limits_;
   Limits largest_limits_;
@@ -153,7 +156,7 @@ class LinkedJoint final : public LinkJoint {
   double torque_zero_Nm_ = 0.0;
   std::uint32_t lost_ = 0;         ///< ticks in a row without a sample
   std::uint32_t fault_ticks_ = 0;  ///< above 0: there is a fault
-  std::uint32_t tried_ticks_ = 0;  ///< of a model that runs in parallel with the one in use
+  std::uint32_t tried_ticks_ = 0;  ///< since the uploaded model runs in parallel
   std::optional<LinkRefusal> upload_result_ = {};
 };
 

@@ -39,7 +39,7 @@ class ModelUpload {
   [[nodiscard]] ArmJointModel* checked() noexcept TORSIO_REALTIME {
     return is_at(Stage::checked) ? &*model_ : nullptr;
   }
-  /// Of the checked model: "grey_box, 12.3 kB".
+  /// What the checked model is: "grey_box, 12345 bytes".
   [[nodiscard]] std::string_view description() const noexcept { return description_; }
   /// The result was taken: what is in `checked` now is freed.
   void end() noexcept TORSIO_REALTIME {

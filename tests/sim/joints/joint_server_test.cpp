@@ -307,7 +307,37 @@ TEST(JointServer, ServesTheJointsOfAnArmTogether) {
   for (std::size_t j = 0; j < 6; ++j)
     EXPECT_EQ(hosted.change(hosted.joints[j], LinkStateCommand::disable), LinkRefusal::none) << j;
   hosted.tick(2);
-  EXPECT_TRUE(hosted.start());
+  ASSERT_TRUE(hosted.start());
+  ASSERT_EQ(hosted.command(hosted.joints[2], LinkInjectFault{.fault = "nan", .channel = 1}),
+            LinkRefusal::none);
+  hosted.hold(20);
+  for (std::size_t j = 0; j < 6; ++j)
+    EXPECT_EQ(hosted.state(j), j == 2 ? LinkDriveState::fault : LinkDriveState::stop) << j;
+  EXPECT_EQ(hosted.server.joints()[0].reason, LinkStateReason::joint_fault);
+}
+
+TEST(JointServer, TwelveJointsFollowEveryReferenceForTenMinutes) {
+  constexpr int kCycles = 600'000;
+  constexpr int kRenewal = 30'000;
+  std::vector<ServedArm> arms;
+  for (std::uint8_t id = 1; id <= 12; ++id)
+    arms.push_back({.setup = single_joint_setup(data_sheet("dfki-28")), .first_id = id});
+  HostedJoints hosted(std::move(arms));
+  ASSERT_TRUE(hosted.start());
+  const auto before = hosted.server.joints();
+  for (int n = 0; n < kCycles; ++n) {
+    for (HostedJoint& joint : hosted.joints) {
+      if (n % kRenewal == 0) hosted.subscribe(joint);
+      hosted.follow(joint, {.mode = JointMode::position,
+                            .position_rad = static_cast<float>(0.2 * std::sin(1e-3 * n))});
+    }
+    hosted.tick();
+  }
+  const auto after = hosted.server.joints();
+  for (std::size_t j = 0; j < after.size(); ++j) {
+    EXPECT_EQ(after[j].state, LinkDriveState::enabled);
+    EXPECT_EQ(after[j].counts.executed - before[j].counts.executed, std::uint64_t{kCycles});
+  }
 }
 
 TEST(JointServer, RefusesIdsThatItCannotGive) {

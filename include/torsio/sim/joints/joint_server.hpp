@@ -34,7 +34,7 @@ class JointServer {
     NdlcomRules rules = NdlcomRules::strict;
     /// With the elasticity of the gears, which takes twice the time: else rotor and gear output turn together.
     bool has_gear_stage = false;
-    std::uint64_t seed = 1;  ///< of the sensors' noise
+    std::uint64_t seed = 1;  ///< for the noise of the sensors
   };
   /// What a joint is, and what has happened to it.
   struct JointStatus {
@@ -67,8 +67,8 @@ class JointServer {
   void cycle(std::uint64_t now_ns) noexcept TORSIO_REALTIME;
   /// Begins a stop of all joints, as if a host had requested it.
   void stop_all(StopCategory category) noexcept TORSIO_REALTIME;
-  /// All drives, measured. By the thread of `cycle`.
-  [[nodiscard]] bool is_at_rest() const noexcept TORSIO_REALTIME;
+  /// All joints are at rest, without power and with their brakes. By the thread of `cycle`.
+  [[nodiscard]] bool is_off() const noexcept TORSIO_REALTIME;
 
   /// What has happened since the last call, in words, a line each: control, states, models, refused frames. By one other
   /// thread than that of `cycle`.
