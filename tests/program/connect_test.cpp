@@ -252,7 +252,9 @@ TEST_F(ConnectToDaemon, ThroughAHostileProxyItMovesOrStops) {
       "wait $PROXY; cat proxy.txt");
   EXPECT_THAT(outcome.out, HasSubstr("to the joints: ")) << outcome.err;
   const Json played = document("played.json");
-  if (!played.is_discarded()) EXPECT_GT(played["references"], 100);
+  if (!played.is_discarded()) {
+    EXPECT_GT(played["references"], 100);
+  }
 }
 
 }  // namespace
