@@ -9,8 +9,10 @@
 namespace torsio {
 namespace {
 
-constexpr double kContactEnd_s = 0.2;  // below its thresholds for this time, a contact is over
-constexpr double kYielding_s = 0.3;    // time in which a reaction ends an overload
+// Below this share of the thresholds for this time, a contact is over: an error that stays near them is one contact.
+constexpr double kContactEndShare = 0.7;
+constexpr double kContactEnd_s = 0.2;
+constexpr double kYielding_s = 0.3;  // time in which a reaction ends an overload
 
 }  // namespace
 
@@ -41,13 +43,9 @@ void ArmController::find_contact(const ArmReference& reference,
   for (std::size_t j = 0; j < joints_.size(); ++j)
     output_.joints[j].external_std_Nm = found.std_dev_Nm[j];
   if (!is_running || is_reacting_) return;
-  if (!found.is_contact) {
-    no_contact_s_ += period_s_;
-    if (no_contact_s_ > kContactEnd_s) output_.contact.is_found = false;
-    return;
-  }
-  no_contact_s_ = 0.0;
-  if (output_.contact.is_found) return;
+  no_contact_s_ = found.largest_share < kContactEndShare ? no_contact_s_ + period_s_ : 0.0;
+  if (no_contact_s_ > kContactEnd_s) output_.contact.is_found = false;
+  if (!found.is_contact || output_.contact.is_found) return;
   output_.contact = {.is_found = true,
                      .joint = found.joint,
                      .time_s = samples.empty() ? kNotMeasured : samples[found.joint].t_s};

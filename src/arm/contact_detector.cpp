@@ -12,13 +12,19 @@ namespace torsio {
 namespace {
 
 constexpr auto kDetectorPlace = "contact detector";
+constexpr double kFading_s =
+    0.2;  // links of 1 to 50 kg m² on springs of 300 to 2300 Nm/rad, damped
 
 }  // namespace
 
-void external_torque_terms(const ArmDynamics& dynamics, std::span<const double> angle_rad,
-                           std::span<const double> speed_rad_s,
-                           std::span<const double> acceleration_rad_s2,
-                           std::span<ExternalTorqueTerms> terms) noexcept {
+ExternalTorqueMotion::ExternalTorqueMotion(double sample_rate_Hz) {
+  require_positive(kDetectorPlace, "the sample rate", sample_rate_Hz);
+  kept_ = std::exp(-1.0 / (kFading_s * sample_rate_Hz));
+}
+
+std::span<const ExternalTorqueTerms> ExternalTorqueMotion::step(
+    const ArmDynamics& dynamics, std::span<const double> angle_rad,
+    std::span<const double> speed_rad_s, std::span<const double> acceleration_rad_s2) noexcept {
   const std::size_t n = dynamics.size();
   ArmDynamics::JointMatrix mass_kg_m2;
   ArmDynamics::PerJoint bias_Nm;
@@ -32,13 +38,17 @@ void external_torque_terms(const ArmDynamics& dynamics, std::span<const double> 
       inertial_Nm += mass * acceleration_rad_s2[j];
     }
     const double torque_Nm = inertial_Nm + bias_Nm[i];
-    terms[i] = {1.0, row, torque_Nm * torque_Nm, inertial_Nm * inertial_Nm};
+    const auto fading = [this](double before, double now) {
+      return std::isfinite(now) ? std::max(before * kept_, now) : before * kept_;
+    };
+    terms_[i] = {1.0, row, fading(terms_[i][2], torque_Nm * torque_Nm),
+                 fading(terms_[i][3], inertial_Nm * inertial_Nm)};
   }
+  return {terms_.data(), n};
 }
 
 ContactDetector::ContactDetector(const Settings& settings, double sample_rate_Hz)
-    : count_(settings.joints.size()) {
-  require_positive(kDetectorPlace, "the sample rate", sample_rate_Hz);
+    : count_(settings.joints.size()), motion_(sample_rate_Hz) {
   require_not_negative(kDetectorPlace, "the time until the observer has settled",
                        settings.settling_s);
   require(count_ > 0 && count_ <= kMaxArmJoints, kDetectorPlace,
@@ -63,11 +73,11 @@ const ContactDetector::Output& ContactDetector::step(const ArmDynamics& dynamics
                                                      std::span<const double> speed_rad_s,
                                                      std::span<const double> acceleration_rad_s2,
                                                      std::span<const double> external_Nm) noexcept {
-  external_torque_terms(dynamics, angle_rad, speed_rad_s, acceleration_rad_s2, terms_);
+  const auto terms = motion_.step(dynamics, angle_rad, speed_rad_s, acceleration_rad_s2);
   output_.largest_share = 0.0;
   output_.joint = 0;
   for (std::size_t j = 0; j < count_; ++j) {
-    output_.std_dev_Nm[j] = std::sqrt(joints_[j].error.variance(terms_[j]));
+    output_.std_dev_Nm[j] = std::sqrt(joints_[j].error.variance(terms[j]));
     const double share = std::abs(external_Nm[j]) / (joints_[j].factor * output_.std_dev_Nm[j]);
     if (!(share > output_.largest_share)) continue;
     output_.largest_share = share;

@@ -46,8 +46,8 @@ class DetectorAtRest : public testing::Test {
 };
 
 TEST_F(DetectorAtRest, HasTheVarianceOfItsFormula) {
-  std::array<ExternalTorqueTerms, kMaxArmJoints> terms;
-  external_torque_terms(dynamics_, angle_rad_, speed_rad_s_, acceleration_rad_s2_, terms);
+  ExternalTorqueMotion motion(kDetectorRate_Hz);
+  const auto terms = motion.step(dynamics_, angle_rad_, speed_rad_s_, acceleration_rad_s2_);
   ArmDynamics::JointMatrix mass;
   dynamics_.mass_matrix(angle_rad_, mass);
   test::Arm6Joints torque_Nm = {};
@@ -69,6 +69,20 @@ TEST_F(DetectorAtRest, HasTheVarianceOfItsFormula) {
   for (std::size_t i = 0; i < test::kArm6Joints; ++i)
     EXPECT_NEAR(output.std_dev_Nm[i],
                 std::sqrt(0.04 + 2.0 * terms[i][1] + 0.01 * terms[i][2] + 0.5 * terms[i][3]), 1e-9);
+}
+
+TEST_F(DetectorAtRest, KeepsTheErrorBarOfAnAccelerationForAWhile) {
+  const ExternalTorqueTerms accelerations_alone = {1e-6, 0.0, 0.0, 0.5};
+  ContactDetector detector(six_joints(accelerations_alone, 5.0), kDetectorRate_Hz);
+  const double moving_Nm = step(detector, {}).std_dev_Nm[1];
+  acceleration_rad_s2_ = {};
+  for (int n = 0; n < 199; ++n) step(detector, {});
+  // Its square has fallen to 1 / e after 0.2 s.
+  EXPECT_NEAR(step(detector, {}).std_dev_Nm[1], moving_Nm * std::exp(-0.5), 1e-4 * moving_Nm);
+  acceleration_rad_s2_.fill(std::numeric_limits<double>::quiet_NaN());
+  step(detector, {});
+  acceleration_rad_s2_ = {};
+  EXPECT_TRUE(std::isfinite(step(detector, {}).std_dev_Nm[1]));
 }
 
 TEST_F(DetectorAtRest, FindsWhatIsAboveItsThresholdAndNamesTheJoint) {

@@ -10,7 +10,6 @@
 namespace torsio {
 namespace {
 
-/// A small one, run once.
 const std::vector<QuantityRow>& identification_rows() {
   static const Study study =
       run_study(find_study("000-arm-identification"), {.seed = 5, .repeats = 1, .is_quick = true});
@@ -26,14 +25,11 @@ const QuantityRow& identification_row(const std::string& condition, const std::s
   return *found;
 }
 
-TEST(ArmIdentificationStudy, FindsPayloadsBetterWithLearnedSprings) {
+TEST(ArmIdentificationStudy, FindsPayloadsBetterWithLearnedSpringsAndCalibratesTheJoints) {
   const double linear = identification_row("payload, linear springs", "error of the centre").value;
   const double learned = identification_row("payload, grey_box", "error of the centre").value;
   EXPECT_LT(learned, linear);
   EXPECT_LT(identification_row("payload, grey_box", "error of the mass").value, 3.0);
-}
-
-TEST(ArmIdentificationStudy, CalibratesTheJointsThatTheWeightLoads) {
   for (const char* joint : {"joint2 (dfki-300)", "joint3 (dfki-120)", "joint5 (dfki-28)"}) {
     const std::string condition = std::string("calibrated in the arm, ") + joint;
     EXPECT_GT(identification_row(condition, "largest torque").value, 5.0) << joint;

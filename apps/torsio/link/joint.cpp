@@ -32,7 +32,7 @@ using JointJson = nlohmann::ordered_json;
 
 constexpr std::int64_t kCycle_ns = 1'000'000;
 /// A stop of all joints at the end takes no longer: then they are without power.
-constexpr std::int64_t kLongestStop_cycles = 2000;
+constexpr std::int64_t kLongestStopCycles = 2000;
 constexpr std::int64_t kCyclesBetweenEvents = 500;
 constexpr auto kEventsEvery = std::chrono::milliseconds(50);
 
@@ -74,7 +74,7 @@ class JointLoop {
       stopped_at_ = cycle_;
     }
     if (!stopped_at_ || cycle_ == *stopped_at_) return true;
-    return !server_.is_off() && cycle_ < *stopped_at_ + kLongestStop_cycles;
+    return !server_.is_off() && cycle_ < *stopped_at_ + kLongestStopCycles;
   }
   void request_end() noexcept { is_end_requested_.store(true); }
 

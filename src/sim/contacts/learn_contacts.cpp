@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "core/report_progress.hpp"
@@ -33,7 +34,7 @@ constexpr std::size_t kProgressEvery = 20'000;
 constexpr double kRateTolerance = 1e-6;
 constexpr std::uint64_t kThresholdSeeds = 0x8000'0000;  // added to the seed
 
-using TermsPerJoint = std::array<ExternalTorqueTerms, kMaxArmJoints>;
+using TermsPerJoint = std::span<const ExternalTorqueTerms>;
 
 /// What one thread has found.
 struct Part {
@@ -53,7 +54,7 @@ struct Work {
 };
 
 void add_ratios(Part& part, const Work& work, const ArmController::Output& output,
-                const TermsPerJoint& terms, ArmDynamics::PerJoint& largest) {
+                TermsPerJoint terms, ArmDynamics::PerJoint& largest) {
   for (std::size_t j = 0; j < work.errors.size(); ++j) {
     const double external_Nm = output.joints[j].external_Nm;
     const double std_dev_Nm = std::sqrt(work.errors[j].variance(terms[j]));
@@ -78,27 +79,23 @@ Part move_freely(const Work& work, double duration_s, std::uint64_t seed,
             .largest_std_dev_Nm = std::vector<double>(joints, 0.0)};
   const auto ticks = static_cast<std::size_t>(duration_s * kBenchRate_Hz);
   const auto block = static_cast<std::size_t>(kBlock_s * kBenchRate_Hz);
-  TermsPerJoint terms;
+  ExternalTorqueMotion terms_of(kBenchRate_Hz);
   ArmDynamics::PerJoint largest = {};
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     if (tick % kProgressEvery == 0)
       report_progress(progress, static_cast<double>(tick) / static_cast<double>(ticks),
                       "the arm moves");
     const ArmController::Output& output = motion.control();
-    const bool is_sampled = !work.errors.empty() || tick % kFitEvery == 0;
-    if (is_sampled) {
-      ArmDynamics::PerJoint external_Nm;
-      for (std::size_t j = 0; j < joints; ++j) external_Nm[j] = output.joints[j].external_Nm;
-      const ArmSession& session = motion.session();
-      external_torque_terms(session.controller().dynamics(), session.angle_rad(),
-                            session.speed_rad_s(), motion.reference().acceleration_rad_s2, terms);
-      if (work.errors.empty()) {
-        for (std::size_t j = 0; j < joints; ++j) {
-          part.samples[j].external_Nm.push_back(external_Nm[j]);
-          part.samples[j].terms.push_back(terms[j]);
-        }
-      } else {
-        add_ratios(part, work, output, terms, largest);
+    const ArmSession& session = motion.session();
+    const TermsPerJoint terms =
+        terms_of.step(session.controller().dynamics(), session.angle_rad(), session.speed_rad_s(),
+                      motion.reference().acceleration_rad_s2);
+    if (!work.errors.empty()) {
+      add_ratios(part, work, output, terms, largest);
+    } else if (tick % kFitEvery == 0) {
+      for (std::size_t j = 0; j < joints; ++j) {
+        part.samples[j].external_Nm.push_back(output.joints[j].external_Nm);
+        part.samples[j].terms.push_back(terms[j]);
       }
     }
     motion.act({});

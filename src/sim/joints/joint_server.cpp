@@ -25,7 +25,7 @@ constexpr std::size_t kIds = 256;
 constexpr std::size_t kEvents = 4096;
 /// Datagrams of one tick: a host that sends more does not make the joints late.
 constexpr int kReadsPerJoint = 8;
-constexpr std::uint64_t kRefusedEvery_ticks = 1000;
+constexpr std::uint64_t kRefusedEveryTicks = 1000;
 
 enum class ServerEvent : std::uint8_t { state, control, refused };
 
@@ -65,7 +65,7 @@ class FrameBundle : public LinkSink {
 
 class JointServer::Parts {
  public:
-  Parts(std::vector<ServedArm> arms, const Settings& settings, LinkTransport& transport);
+  Parts(std::vector<ServedArm> served, const Settings& settings, LinkTransport& line_transport);
 
   void cycle(std::uint64_t now_ns) noexcept;
   std::vector<std::string> take_events();
@@ -196,7 +196,7 @@ void JointServer::Parts::note_events() noexcept {
            static_cast<double>(endpoint.drive().reason()));
     }
     // Once per second, one joint after the other.
-    if (tick_ % kRefusedEvery_ticks != k) continue;
+    if (tick_ % kRefusedEveryTicks != k) continue;
     if (const std::uint64_t refused = total_refused(endpoint); refused != last.refused) {
       note(k, ServerEvent::refused, static_cast<double>(refused - last.refused), 0.0);
       last.refused = refused;

@@ -10,7 +10,7 @@ namespace torsio {
 namespace {
 
 /// After this time without power taken over by the motors, the arm stops.
-constexpr std::uint32_t kLongestRelease_ticks = 2000;
+constexpr std::uint32_t kLongestReleaseTicks = 2000;
 
 /// Without the stiff stage of the gear longer steps suffice.
 constexpr double kRigidStep_s = 5e-4;
@@ -110,7 +110,7 @@ void LinkedArm::open_brakes() noexcept {
   if (controller_.release()) {
     is_release_wanted_ = false;
     last_cause_ = ArmStopCause::none;
-  } else if (++release_ticks_ > kLongestRelease_ticks) {
+  } else if (++release_ticks_ > kLongestReleaseTicks) {
     stop(StopCategory::power_off);
     stop_reason_ = LinkStateReason::joint_fault;
   }

@@ -12,7 +12,7 @@ namespace torsio {
 namespace {
 
 /// A new model runs in parallel with the one in use until its filters and memory have settled.
-constexpr std::uint32_t kTrial_ticks = 500;
+constexpr std::uint32_t kTrialTicks = 500;
 
 constexpr std::array<std::string_view, kJointChannels> kChannelNames = {"motor_angle_rad",
                                                                         "gear_angle_rad",
@@ -296,7 +296,7 @@ void LinkedJoint::try_model() noexcept {
   const JointSample& sample = arm_.sample(index_);
   static_cast<void>(model->estimator->step(sample));
   static_cast<void>(model->inverse.step(output().torque.value, sample));
-  if (++tried_ticks_ < kTrial_ticks) return;
+  if (++tried_ticks_ < kTrialTicks) return;
   const std::string_view description = upload_.description();
   const bool is_used = arm_.controller().exchange_model(index_, *model);
   if (is_used) model_size_ = description.copy(model_.data(), model_.size());

@@ -89,7 +89,7 @@ class LinkedJoint final : public LinkJoint {
   /// Its signals are missing for longer than the controller tolerates.
   [[nodiscard]] bool is_lost() const noexcept { return lost_ > kToleratedLosses; }
   /// The arm has found a fault in it.
-  void found_fault() noexcept TORSIO_REALTIME { fault_ticks_ = kShortestFault_ticks; }
+  void found_fault() noexcept TORSIO_REALTIME { fault_ticks_ = kShortestFaultTicks; }
   /// A fault ends when its cause has ended and the arm is at rest.
   void end_fault(bool has_ended) noexcept TORSIO_REALTIME;
   /// Once per tick, after the controller: the uploaded model runs in parallel, and is then used.
@@ -124,7 +124,7 @@ class LinkedJoint final : public LinkJoint {
   [[nodiscard]] ModelUpload& upload() noexcept { return upload_; }
 
  private:
-  static constexpr std::uint32_t kShortestFault_ticks = 10;
+  static constexpr std::uint32_t kShortestFaultTicks = 10;
   static constexpr std::uint32_t kToleratedLosses = 3;  ///< as `ArmController::Settings`
 
   [[nodiscard]] bool is_in_range(const JointReference& reference) const noexcept;
