@@ -74,6 +74,15 @@ Row torque_loop_dgmm300_step();
 Row torque_loop_grey_box_step();
 Row mailbox_read();
 Row recorder_push();
+Row link_encode();
+Row link_encode_bytewise();
+Row link_encode_escapes();
+Row link_decode();
+Row link_decode_bytewise();
+Row link_decode_escapes();
+Row link_round_trip();
+Row joints_cycle();
+Row joints_cycle_p999();
 Row redundancy_step();
 Row monitor_step();
 

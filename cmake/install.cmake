@@ -12,6 +12,8 @@ install(TARGETS torsio_realtime EXPORT torsioRealtimeTargets FILE_SET HEADERS AR
 install(EXPORT torsioRealtimeTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 install(TARGETS torsio_arm EXPORT torsioArmTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT torsioArmTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+install(TARGETS torsio_link EXPORT torsioLinkTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT torsioLinkTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 if(TORSIO_BUILD_LAB)
   install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
   if(NOT CMAKE_CROSSCOMPILING)

@@ -32,56 +32,106 @@ std::string quoted(const std::string& help) {
   return "'" + text + "'";
 }
 
+/// "list", "describe": the verbs below a verb.
+std::vector<std::string> part_names(const CLI::App& verb) {
+  std::vector<std::string> names;
+  for (const CLI::App* part : verbs_of(verb)) names.push_back(part->get_name());
+  return names;
+}
+
+/// The options of a verb and, where it has verbs below it, a case for each of those.
+std::string bash_words(const CLI::App& verb) {
+  const std::string own = fmt::format("words='{}'", fmt::join(option_names(verb), " "));
+  const std::vector<std::string> parts = part_names(verb);
+  if (parts.empty()) return own;
+  std::string cases;
+  for (const CLI::App* part : verbs_of(verb))
+    cases += fmt::format("      {}) words='{}' ;;\n", part->get_name(),
+                         fmt::join(option_names(*part), " "));
+  return fmt::format("parts='{}'; case ${{COMP_WORDS[2]}} in\n{}      *) {} ;;\n    esac",
+                     fmt::join(parts, " "), cases, own);
+}
+
 std::string bash_script(const CLI::App& app) {
   std::string cases;
   std::string verbs;
   for (const CLI::App* verb : verbs_of(app)) {
     verbs += verb->get_name() + " ";
-    cases += fmt::format("    {}) words='{}' ;;\n", verb->get_name(),
-                         fmt::join(option_names(*verb), " "));
+    cases += fmt::format("    {}) {} ;;\n", verb->get_name(), bash_words(*verb));
   }
   return fmt::format(
       "_torsio() {{\n"
-      "  local current=${{COMP_WORDS[COMP_CWORD]}} words\n"
+      "  local current=${{COMP_WORDS[COMP_CWORD]}} words parts\n"
       "  case ${{COMP_WORDS[1]}} in\n{}  esac\n"
-      "  if ((COMP_CWORD == 1)); then words='{}{}'; elif [[ $current != -* ]]; then return; fi\n"
+      "  if ((COMP_CWORD == 1)); then words='{}{}'\n"
+      "  elif ((COMP_CWORD == 2)) && [[ $parts && $current != -* ]]; then words=$parts\n"
+      "  elif [[ $current != -* ]]; then return; fi\n"
       "  COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
       "}}\n"
       "complete -o default -F _torsio torsio\n",
       cases, verbs, fmt::join(option_names(app), " "));
 }
 
+/// As `bash_words`.
+std::string zsh_words(const CLI::App& verb) {
+  const std::string own = fmt::format("compadd -- {}", fmt::join(option_names(verb), " "));
+  if (part_names(verb).empty()) return own;
+  std::string cases;
+  for (const CLI::App* part : verbs_of(verb))
+    cases += fmt::format("        {}) compadd -- {} ;;\n", part->get_name(),
+                         fmt::join(option_names(*part), " "));
+  return fmt::format("case $words[3] in\n{}        *) {} ;;\n      esac", cases, own);
+}
+
 std::string zsh_script(const CLI::App& app) {
   std::string verbs;
+  std::string parts;
   std::string cases;
   for (const CLI::App* verb : verbs_of(app)) {
     std::string help = verb->get_description();
     std::ranges::replace(help, ':', ';');
     verbs += fmt::format("    {}\n", quoted(verb->get_name() + ":" + help));
-    cases += fmt::format("      {}) compadd -- {} ;;\n", verb->get_name(),
-                         fmt::join(option_names(*verb), " "));
+    cases += fmt::format("      {}) {} ;;\n", verb->get_name(), zsh_words(*verb));
+    if (const auto names = part_names(*verb); !names.empty())
+      parts += fmt::format("      {}) compadd -- {} ;;\n", verb->get_name(), fmt::join(names, " "));
   }
   return fmt::format(
       "#compdef torsio\n_torsio() {{\n  local -a verbs=(\n{}  )\n"
       "  if ((CURRENT == 2)); then\n    _describe verb verbs\n"
       "  elif [[ $words[CURRENT] == -* ]]; then\n    case $words[2] in\n{}    esac\n"
+      "  elif ((CURRENT == 3)); then\n    case $words[2] in\n{}      *) _files ;;\n    esac\n"
       "  else\n    _files\n  fi\n}}\ncompdef _torsio torsio\n",
-      verbs, cases);
+      verbs, cases, parts);
+}
+
+/// @param condition when the options apply, for example that a verb was typed
+std::string fish_options(const CLI::App& verb, const std::string& condition) {
+  std::string script;
+  for (const CLI::Option* option : verb.get_options()) {
+    if (option->get_group().empty() || option->get_positional()) continue;
+    script += fmt::format("complete -c torsio -n '{}'", condition);
+    for (const std::string& name : option->get_snames()) script += " -s " + name;
+    for (const std::string& name : option->get_lnames()) script += " -l " + name;
+    if (option->get_items_expected_max() > 0) script += " -r";
+    script += fmt::format(" -d {}\n", quoted(option->get_description()));
+  }
+  return script;
 }
 
 std::string fish_script(const CLI::App& app) {
   std::string script;
   for (const CLI::App* verb : verbs_of(app)) {
+    const std::string is_typed = "__fish_seen_subcommand_from " + verb->get_name();
     script += fmt::format("complete -c torsio -n __fish_use_subcommand -a {} -d {}\n",
                           verb->get_name(), quoted(verb->get_description()));
-    for (const CLI::Option* option : verb->get_options()) {
-      if (option->get_group().empty() || option->get_positional()) continue;
-      script +=
-          fmt::format("complete -c torsio -n '__fish_seen_subcommand_from {}'", verb->get_name());
-      for (const std::string& name : option->get_snames()) script += " -s " + name;
-      for (const std::string& name : option->get_lnames()) script += " -l " + name;
-      if (option->get_items_expected_max() > 0) script += " -r";
-      script += fmt::format(" -d {}\n", quoted(option->get_description()));
+    script += fish_options(*verb, is_typed);
+    const std::string parts = fmt::format("{}", fmt::join(part_names(*verb), " "));
+    for (const CLI::App* part : verbs_of(*verb)) {
+      script += fmt::format(
+          "complete -c torsio -n '{0}; and not __fish_seen_subcommand_from {1}' -a {2} -d {3}\n",
+          is_typed, parts, part->get_name(), quoted(part->get_description()));
+      script += fish_options(
+          *part, fmt::format("{}; and __fish_seen_subcommand_from {}", is_typed, part->get_name()));
     }
   }
   return script;

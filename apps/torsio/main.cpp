@@ -74,6 +74,7 @@ int run(int argc, char** argv) {
   add_demo(app);
   add_simulate(app);
   add_arm(app);
+  add_joint(app);
   add_check(app);
   add_fit(app);
   add_evaluate(app);
@@ -89,6 +90,7 @@ int run(int argc, char** argv) {
   add_track(app);
   add_tune_loop(app);
   add_design(app);
+  add_connect(app);
   add_reproduce(app);
   add_unpack(app);
   add_convert(app);

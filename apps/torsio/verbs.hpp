@@ -7,6 +7,7 @@
 /// 2 the call was wrong).
 void add_simulate(CLI::App& app);
 void add_arm(CLI::App& app);
+void add_joint(CLI::App& app);
 void add_check(CLI::App& app);
 void add_fit(CLI::App& app);
 void add_drift(CLI::App& app);
@@ -24,6 +25,7 @@ void add_track(CLI::App& app);
 void add_transfer(CLI::App& app);
 void add_tune_loop(CLI::App& app);
 void add_design(CLI::App& app);
+void add_connect(CLI::App& app);
 void add_reproduce(CLI::App& app);
 void add_unpack(CLI::App& app);
 void add_bench(CLI::App& app);

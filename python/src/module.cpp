@@ -71,4 +71,5 @@ PYBIND11_MODULE(_core, module) {
   bind_learning(module);
   bind_control(module);
   bind_arms(module);
+  bind_links(module);
 }

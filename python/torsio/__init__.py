@@ -37,7 +37,7 @@ from ._faults import Fault
 from ._tables import recording_from_dict, recording_from_pandas, recording_to_pandas
 
 if TYPE_CHECKING:
-    from . import plot
+    from . import link, plot
     from ._learning import attribute, check, compare, crossvalidate, drift, evaluate, fit, margins, track, transfer
     from ._results import (
         CheckReport,
@@ -94,6 +94,7 @@ __all__ = [
     "evaluate",
     "families",
     "fit",
+    "link",
     "load",
     "margins",
     "plot",
@@ -115,8 +116,8 @@ _LATER = {
 def __getattr__(name: str) -> Any:
     import importlib
 
-    if name == "plot":
-        return importlib.import_module("torsio.plot")
+    if name in ("link", "plot"):
+        return importlib.import_module(f"torsio.{name}")
     for module, names in _LATER.items():
         if name in names.split():
             value = getattr(importlib.import_module(f"torsio.{module}"), name)
@@ -126,4 +127,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__", "plot"]
+    return [*__all__, "__version__"]

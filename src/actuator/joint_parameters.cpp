@@ -1,5 +1,6 @@
 #include "torsio/actuator/joint_parameters.hpp"
 
+#include <algorithm>
 #include <string>
 #include <variant>
 
@@ -29,6 +30,13 @@ Drive drive_of(const DataSheet& sheet) {
           .current_time_constant_s = sheet.motor.current_time_constant_s.value,
           .supply_V = sheet.motor.supply_V.value,
           .resistance_Ohm = sheet.motor.winding_resistance_Ohm.value};
+}
+
+double speed_limit_of(const DataSheet& sheet) {
+  constexpr double kSupplyShare = 0.95;
+  const Drive drive = drive_of(sheet);
+  return std::min(sheet.rating.speed_rad_s.value,
+                  kSupplyShare * drive.supply_V / drive.torque_per_current());
 }
 
 SeriesElasticJoint series_elastic_joint(const DataSheet& sheet) {

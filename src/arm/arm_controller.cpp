@@ -15,6 +15,7 @@ namespace torsio {
 namespace {
 
 constexpr auto kPlace = "arm controller";
+constexpr double kExchange_s = 0.1;         // decay of the difference between two models
 constexpr double kGuidingWidth_rad = 0.01;  // width of the friction that holds a guided arm
 
 bool is_finite(const ArmFrame& frame) noexcept {
@@ -38,9 +39,11 @@ detail::JointInputs inputs_of(const MonitoredTorque& monitored) {
 }  // namespace
 
 ArmController::Axis::Axis(Joint&& from, double sample_rate_Hz, double speed_cutoff_Hz)
-    : controller(std::move(from.inverse), from.control, sample_rate_Hz),
+    : controller(ExchangeableInverse(std::move(from.inverse), kExchange_s, sample_rate_Hz),
+                 from.control, sample_rate_Hz),
       stop(from.stop, sample_rate_Hz),
       estimator(std::move(from.estimator)),
+      transfer(kExchange_s, sample_rate_Hz),
       monitored(std::move(from.monitored)),
       speed(sample_rate_Hz, speed_cutoff_Hz),
       raw_speed(sample_rate_Hz),
@@ -110,6 +113,8 @@ void ArmController::reset() noexcept {
     axis.speed.reset();
     axis.raw_speed.reset();
     axis.motor_speed.reset();
+    axis.transfer.reset();
+    axis.is_exchanged = false;
     axis.correction_rad = 0.0;
     axis.measured = {};
     axis.lost = 0;
@@ -147,6 +152,17 @@ bool ArmController::release() noexcept {
   proof_s_ = 0.0;
   end_reaction();
   hold();
+  return true;
+}
+
+bool ArmController::exchange_model(std::size_t joint, ArmJointModel& model) noexcept {
+  Axis& axis = joints_[joint];
+  if (axis.monitored) return false;
+  axis.estimator.swap(model.estimator);
+  axis.controller.inverse().exchange(model.inverse);
+  std::swap(axis.bearing_Nm, model.bearing_Nm);
+  std::swap(axis.viscous_Nms_rad, model.viscous_Nms_rad);
+  axis.is_exchanged = true;
   return true;
 }
 
@@ -195,6 +211,7 @@ const ArmController::Output& ArmController::step(const ArmReference& reference,
     out.is_powered = command.is_powered;
     out.is_brake_open = command.is_brake_open;
     out.phase = command.phase;
+    out.thermal_load = controlled.cascade.thermal_load;
     out.limit = controlled.limit;
     out.fault = controlled.fault;
     output_.is_at_rest = output_.is_at_rest && command.is_drive_at_rest;
@@ -256,8 +273,16 @@ void ArmController::estimate(std::span<const JointSample> samples) noexcept {
     } else {
       torque.value = axis.stiffness_Nm_rad * sample.spring_deflection_rad();
       if (!std::isfinite(torque.value))
-        torque = {.value = output_.joints[j].torque.value, .fault = Fault::input_not_finite};
+        torque = {
+            .value = output_.joints[j].torque.value + axis.torque_zero_Nm - axis.transfer.pending(),
+            .fault = Fault::input_not_finite};
     }
+    torque.value -= axis.torque_zero_Nm;
+    if (std::exchange(axis.is_exchanged, false)) {
+      axis.transfer.reset();
+      axis.transfer.add(output_.joints[j].torque.value - torque.value);
+    }
+    torque.value += axis.transfer.step();
     output_.joints[j].torque = torque;
     on_links_Nm[j] = torque.value - bearing_torque(axis, speed_rad_s_[j]);
     output_.joints[j].link_Nm = on_links_Nm[j];

@@ -94,6 +94,7 @@ JointCascade::JointCascade(const Settings& settings, double sample_rate_Hz)
       soft_speed_rad_s_(settings.limits.speed_rad_s -
                         settings.limits.max_unmeasured_load_Nm /
                             (settings.drive.inertia() * settings.bandwidth_rad_s)),
+      largest_speed_rad_s_(settings.limits.speed_rad_s),
       fault_keep_(std::exp(-period_s_ / settings.fault_decay_s)),
       position_1_s_(gains_of(settings).position_1_s),
       velocity_({.gains = gains_of(settings).velocity}, sample_rate_Hz),
@@ -163,6 +164,20 @@ bool JointCascade::set_gains(const Gains& gains) noexcept {
   static_cast<void>(velocity_.set_gains(gains.velocity));
   static_cast<void>(torque_.set_gains(gains.torque));
   is_switching_ = true;
+  return true;
+}
+
+bool JointCascade::set_motion_limits(double lowest_rad, double highest_rad,
+                                     double speed_rad_s) noexcept {
+  Limits& limits = settings_.limits;
+  const double soft_rad_s = soft_speed_rad_s_ - limits.speed_rad_s + speed_rad_s;
+  if (!(speed_rad_s <= largest_speed_rad_s_ && soft_rad_s > 0.0 &&
+        highest_rad - lowest_rad > 2.0 * margin_rad_))
+    return false;
+  limits.lowest_rad = lowest_rad;
+  limits.highest_rad = highest_rad;
+  limits.speed_rad_s = speed_rad_s;
+  soft_speed_rad_s_ = soft_rad_s;
   return true;
 }
 

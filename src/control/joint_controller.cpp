@@ -73,6 +73,12 @@ void JointControllerCore::reset() noexcept {
   is_accepted_ = true;
 }
 
+bool JointControllerCore::set_limits(double lowest_rad, double highest_rad, double speed_rad_s,
+                                     double torque_Nm) noexcept {
+  return torque_Nm > 0.0 && cascade_.set_motion_limits(lowest_rad, highest_rad, speed_rad_s) &&
+         torque_.set_largest_torque(torque_Nm);
+}
+
 JointState JointControllerCore::measure(const JointSample& sample) noexcept {
   const double angle_rad = sample.motor_angle_rad / joint_.drive.ratio;
   const double deflection_rad = sample.spring_deflection_rad();

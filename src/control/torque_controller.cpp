@@ -71,6 +71,12 @@ void TorqueLoopCore::reset() noexcept {
   applied_ = 0.0;
 }
 
+bool TorqueLoopCore::set_largest_torque(double torque_Nm) noexcept {
+  if (!(torque_Nm > 0.0)) return false;
+  settings_.largest_torque_Nm = torque_Nm;
+  return true;
+}
+
 double TorqueLoopCore::accept(double wanted_Nm, bool is_planned) noexcept {
   is_planned_ = is_planned;
   is_refused_ = !std::isfinite(wanted_Nm);

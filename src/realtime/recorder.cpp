@@ -106,6 +106,9 @@ class Recorder::Writer {
   Writer& operator=(const Writer&) = delete;
 
   FrameRing& ring() noexcept { return ring_; }
+  [[nodiscard]] std::uint64_t dropped() const noexcept {
+    return ring_.dropped() + lost_.load(std::memory_order_relaxed);
+  }
 
   RecorderReport close() {
     if (thread_.joinable()) {
@@ -127,7 +130,7 @@ class Recorder::Writer {
       sync_when_due();
       if (!is_last) std::this_thread::sleep_for(kPoll);
     }
-    report_.dropped = ring_.dropped() + lost_;
+    report_.dropped = dropped();
     seal({.dropped = report_.dropped, .frames = report_.frames}, bytes_);
     (void)file_.append(bytes_);
     file_.close();
@@ -171,7 +174,7 @@ class Recorder::Writer {
   BlockFile file_;
   FrameBlock block_;
   std::vector<std::byte> bytes_;
-  std::uint64_t lost_ = 0;  ///< frames that the disk did not take
+  std::atomic<std::uint64_t> lost_{0};  ///< frames that the disk did not take
   Clock::time_point sealed_at_;
   Clock::time_point synced_at_;
   RecorderReport report_;
@@ -188,7 +191,7 @@ bool Recorder::push(std::int64_t tick, std::span<const double> values) noexcept 
   return writer_->ring().push(tick, values);
 }
 
-std::uint64_t Recorder::dropped() const noexcept { return writer_->ring().dropped(); }
+std::uint64_t Recorder::dropped() const noexcept { return writer_->dropped(); }
 
 RecorderReport Recorder::close() { return writer_->close(); }
 

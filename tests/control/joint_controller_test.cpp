@@ -372,5 +372,46 @@ RC_GTEST_PROP(JointController, SwitchesItsModeWithoutAJump, ()) {
   }
 }
 
+TEST(JointController, KeepsLimitsThatAreSetWhileItRuns) {
+  const auto settings = controller_settings("dfki-50");
+  Controller controller = controller_of(settings);
+  SpringJoint joint(settings.torque.deflection.joint, JointOutput::free);
+  const double speed_rad_s = settings.limits.speed_rad_s;
+  ASSERT_TRUE(controller.set_limits(-0.2, 0.15, 0.5 * speed_rad_s, 3.0));
+  double farthest_rad = 0.0;
+  double fastest_rad_s = 0.0;
+  for (int n = 0; n < 3000; ++n) {
+    run(controller, joint, drive_of(settings), {.mode = JointMode::position, .position_rad = 0.29},
+        1);
+    farthest_rad = std::max(farthest_rad, joint.angle_rad());
+    fastest_rad_s = std::max(fastest_rad_s, joint.speed_rad_s());
+  }
+  EXPECT_LE(farthest_rad, 0.15);
+  EXPECT_GT(farthest_rad, 0.05);
+  EXPECT_LE(fastest_rad_s, 0.5 * speed_rad_s);
+  const auto out =
+      run(controller, joint, drive_of(settings), {.mode = JointMode::torque, .torque_Nm = 5.0}, 1);
+  EXPECT_EQ(out.torque.wanted_torque_Nm, 3.0);
+  EXPECT_FALSE(controller.set_limits(0.1, 0.1, speed_rad_s, 3.0));
+  EXPECT_FALSE(controller.set_limits(-0.2, 0.2, 2.0 * speed_rad_s, 3.0));
+  EXPECT_FALSE(controller.set_limits(-0.2, 0.2, 1e-9, 3.0));
+  EXPECT_FALSE(controller.set_limits(-0.2, 0.2, speed_rad_s, 0.0));
+  EXPECT_FALSE(controller.set_limits(kNaN, 0.2, speed_rad_s, 3.0));
+}
+
+TEST(JointController, ChangesItsGainsWithoutAJump) {
+  const auto settings = controller_settings("dfki-50");
+  Controller controller = controller_of(settings);
+  SpringJoint joint(settings.torque.deflection.joint, JointOutput::free);
+  const JointReference reference{.mode = JointMode::position, .position_rad = 0.1};
+  const double before_A = run(controller, joint, drive_of(settings), reference, 20).current_A;
+  JointCascade::Gains gains = JointCascade::gains_for(drive_of(settings), 100.0);
+  ASSERT_TRUE(controller.set_gains(gains));
+  EXPECT_NEAR(controller.step(reference, sample_of(joint, drive_of(settings))).current_A, before_A,
+              1e-9);
+  gains.position_1_s = -1.0;
+  EXPECT_FALSE(controller.set_gains(gains));
+}
+
 }  // namespace
 }  // namespace torsio

@@ -14,6 +14,7 @@
 #include "support/examples/linear.hpp"
 #include "support/examples/viscoelastic.hpp"
 #include "support/numbers.hpp"
+#include "torsio/control/exchangeable_inverse.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {
@@ -178,6 +179,23 @@ TEST(ModelInverse, RequestsWithoutAStepAcrossTheEndsOfItsRange) {
       last_rad = request_rad;
     }
   }
+}
+
+TEST(ExchangeableInverse, ContinuesFromItsLastDeflection) {
+  ExchangeableInverse inverse(LinearInverse(100.0), 0.1, 1000.0);
+  EXPECT_EQ(inverse.step(5.0, {}).value, 0.05);
+  AnyInverse other = LinearInverse(200.0);
+  inverse.exchange(other);
+  EXPECT_EQ(other.step(5.0, {}).value, 0.05) << "the one before";
+  EXPECT_NEAR(inverse.step(5.0, {}).value, 0.05, 1e-12);
+  double last_rad = 0.05;
+  for (int n = 0; n < 2000; ++n) {
+    const double wanted_rad = inverse.step(5.0, {}).value;
+    ASSERT_LE(wanted_rad, last_rad);
+    ASSERT_GT(wanted_rad, last_rad - 0.3e-3);
+    last_rad = wanted_rad;
+  }
+  EXPECT_NEAR(last_rad, 0.025, 1e-9);
 }
 
 }  // namespace

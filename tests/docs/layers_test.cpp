@@ -94,7 +94,8 @@ Layers layers() {
   layers.uses = {{"runtime", {}},
                  {"files", {"runtime"}},
                  {"realtime", {"runtime"}},
-                 {"arm", {"files", "runtime"}}};
+                 {"arm", {"files", "runtime"}},
+                 {"link", {"runtime"}}};
   const std::string cmake = file_bytes(kRoot / "src/CMakeLists.txt");
   const std::regex library(R"(torsio_slow_library\((\w+)\s[^)]*?USES ([a-z ]+))");
   for (std::sregex_iterator at(cmake.begin(), cmake.end(), library); at != std::sregex_iterator();
@@ -132,7 +133,8 @@ TEST(Layers, AreThoseOfTheTable) {
   EXPECT_EQ(found.folder_of("data/csv/csv.cpp"), "data");
   EXPECT_EQ(found.folders.at("core").library, "runtime");
   EXPECT_THAT(found.uses.at("learn"), ElementsAre("data", "files", "realtime", "runtime"));
-  EXPECT_THAT(found.uses.at("bench"), ElementsAre("arm", "data", "files", "realtime", "runtime"));
+  EXPECT_THAT(found.uses.at("bench"),
+              ElementsAre("arm", "data", "files", "link", "realtime", "runtime"));
   EXPECT_TRUE(found.uses.at("coupling").contains("trials"));
 }
 

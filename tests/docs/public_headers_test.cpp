@@ -21,8 +21,8 @@ using testing::IsEmpty;
 using test::file_bytes;
 using test::kRoot;
 
-constexpr const char* kStarts[] = {"runtime", "files",  "realtime", "data",   "learn",
-                                   "bench",   "trials", "report",   "design", "arm"};
+constexpr const char* kStarts[] = {"runtime", "files",  "realtime", "data", "learn", "bench",
+                                   "trials",  "report", "design",   "arm",  "link"};
 
 /// The public headers that a text includes, as "core/error.hpp".
 std::set<std::string> included(const std::string& text) {
@@ -85,12 +85,12 @@ TEST(PublicHeaders, AreThoseThatAUserIncludes) {
   EXPECT_THAT(not_reached, IsEmpty()) << "these belong into src";
 }
 
-TEST(PublicHeaders, AreAtMostAHundredAndFifty) {
+TEST(PublicHeaders, AreAtMostAHundredAndEighty) {
   std::size_t headers = 0;
   for (const fs::directory_entry& entry :
        fs::recursive_directory_iterator(kRoot / "include/torsio"))
     headers += entry.is_regular_file() ? 1 : 0;
-  EXPECT_LE(headers, 150U);
+  EXPECT_LE(headers, 180U);
 }
 
 TEST(StartHeaders, ListFiveNamesThatTheyDeclare) {

@@ -1,6 +1,6 @@
 # cmake -DBUILD=<build tree> -DSOURCE=<tests/install/stranger> -DWORK=<scratch> -P install_test.cmake
-# Installs torsio into a scratch prefix, builds six strangers' projects against it (one without the lab, one with it, one
-# that fits models, one with a real-time loop, one with an arm, one in C where libtorsio.so is built) and runs them.
+# Installs torsio into a scratch prefix, builds seven strangers' projects against it (one without the lab, one with it, one
+# that fits models, one with a real-time loop, one with an arm, one with a link, one in C where libtorsio.so is built) and runs them.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -31,6 +31,12 @@ run(${CMAKE_COMMAND} --build ${WORK}/build_arm)
 run(${WORK}/build_arm/stranger_with_an_arm ${SOURCE}/../../../share/torsio/arm6.urdf)
 if(NOT output MATCHES "6 joints, weight at joint 2: -?[0-9.]+ Nm")
   message(FATAL_ERROR "the stranger's arm printed: ${output}")
+endif()
+run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_with_a_link -B ${WORK}/build_link -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+run(${CMAKE_COMMAND} --build ${WORK}/build_link)
+run(${WORK}/build_link/stranger_with_a_link)
+if(NOT output MATCHES "a ping of [0-9]+ bytes")
+  message(FATAL_ERROR "the stranger's link printed: ${output}")
 endif()
 set(torsio ${WORK}/prefix/bin/torsio)
 run(${WORK}/build_realtime/stranger_in_real_time ${WORK}/run.tsr)

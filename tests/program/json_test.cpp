@@ -45,6 +45,7 @@ const JsonCase kCases[] = {
     {"EvaluateAModelAlone", kModel, "evaluate m.safetensors"},
     {"Convert", kRecord, "convert a.csv -o a.mcap"},
     {"Fit", kRecord, "fit a.csv --model linear -o m.safetensors"},
+    {"Joint", "", "joint --unix joint --fast --duration 1s"},
     {"Import", "",
      "import '" TORSIO_SOURCE "/tests/golden/import/weights_mlp.json' --activation softsign "
      "--inputs a_rad,b_rad,c_rad --rate 100Hz -o m.safetensors"},

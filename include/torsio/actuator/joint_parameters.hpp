@@ -12,6 +12,9 @@ namespace torsio {
 /// The drive of an actuator's data sheet; all its gears are combined into one.
 [[nodiscard]] Drive drive_of(const DataSheet& sheet);
 
+/// The rated speed of the joint [rad/s], or 95 % of that at which the supply is used up, whichever is smaller.
+[[nodiscard]] double speed_limit_of(const DataSheet& sheet);
+
 /// The joint of a data sheet: the relaxed stiffness of an elastomer, the middle one of rubber; a
 /// torsion tube before the last gear is referred to the joint, and the gear is rigid: M contains
 /// the inertia of its wave generator.

@@ -13,9 +13,9 @@
 #include "torsio/arm/contact_detector.hpp"
 #include "torsio/arm/contact_reaction.hpp"
 #include "torsio/arm/momentum_observer.hpp"
+#include "torsio/control/exchangeable_inverse.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_stop.hpp"
-#include "torsio/control/model_inverse.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
@@ -51,6 +51,14 @@ enum class ArmStopCause : std::uint8_t {
   monitor,      ///< the monitor of a joint, or it was not ready in time
   overload,     ///< the external torque of a joint exceeded its limit for too long
   contact,      ///< a contact was found, and the reaction is a stop
+};
+
+/// What a joint takes for the torque of its spring.
+struct ArmJointModel {
+  std::optional<TorqueEstimator> estimator = {};  ///< none: stiffness times deflection
+  AnyInverse inverse = LinearInverse(1.0);
+  double bearing_Nm = 0.0;       ///< as `ArmController::Joint::bearing_Nm`
+  double viscous_Nms_rad = 0.0;  ///< d
 };
 
 /// The controllers of an arm of series-elastic joints in one step:
@@ -140,6 +148,7 @@ class ArmController {
     double external_std_Nm = kNotMeasured;  ///< its standard deviation, if contacts are looked for
     double speed_rad_s = 0.0;               ///< measured, of the link
     JointStop::Phase phase = JointStop::Phase::running;
+    double thermal_load = 0.0;  ///< heat of the winding: 0 cold, 1 as hot as it may be
     JointCascade::Limit limit = JointCascade::Limit::none;
     Fault fault = Fault::none;
   };
@@ -193,6 +202,26 @@ class ArmController {
   bool set_payload(const BodyInertia& payload) noexcept TORSIO_REALTIME {
     return dynamics_.set_payload(payload);
   }
+  /// As `JointController::set_gains` of a joint.
+  [[nodiscard]] bool set_gains(std::size_t joint,
+                               const JointCascade::Gains& gains) noexcept TORSIO_REALTIME {
+    return joints_[joint].controller.set_gains(gains);
+  }
+  /// As `JointController::set_limits` of a joint, at its motor side.
+  [[nodiscard]] bool set_limits(std::size_t joint, double lowest_rad, double highest_rad,
+                                double speed_rad_s, double torque_Nm) noexcept TORSIO_REALTIME {
+    return joints_[joint].controller.set_limits(lowest_rad, highest_rad, speed_rad_s, torque_Nm);
+  }
+  /// From the next step on another model gives the torque of a joint's spring and its inverse. Neither makes a step: the
+  /// difference decays in 0.1 s.
+  /// @param model on return the one before
+  /// @returns false, and nothing changes, for a joint with a monitor
+  [[nodiscard]] bool exchange_model(std::size_t joint,
+                                    ArmJointModel& model) noexcept TORSIO_REALTIME;
+  /// Subtracts this torque [Nm] from a joint's estimate from the next step on.
+  void set_torque_zero(std::size_t joint, double torque_Nm) noexcept TORSIO_REALTIME {
+    joints_[joint].torque_zero_Nm = torque_Nm;
+  }
   [[nodiscard]] std::size_t size() const noexcept { return joints_.size(); }
   /// @returns none for a joint without a monitor
   [[nodiscard]] const MonitoredTorque* monitored(std::size_t joint) const noexcept {
@@ -204,9 +233,12 @@ class ArmController {
   struct Axis {
     Axis(Joint&& from, double sample_rate_Hz, double speed_cutoff_Hz);
 
-    JointController<AnyInverse> controller;
+    JointController<ExchangeableInverse> controller;
     JointStop stop;
     std::optional<TorqueEstimator> estimator;
+    detail::BumplessTransfer transfer;  ///< difference of the torques of two models
+    bool is_exchanged = false;          ///< the model, since the last step
+    double torque_zero_Nm = 0.0;
     std::optional<MonitoredTorque> monitored;
     std::optional<detail::JointInputs> monitor_inputs;
     std::vector<SignalSample> monitor_samples;

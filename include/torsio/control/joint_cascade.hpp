@@ -199,6 +199,12 @@ class JointCascade {
   /// @returns false, and all are kept, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
 
+  /// The limits of the motion, from the next step on. Beyond a new limit the override brings the joint back.
+  /// @returns false, and all are kept, if the speed is not finite or above that of the construction, or the limits leave no
+  /// space for their margins
+  [[nodiscard]] bool set_motion_limits(double lowest_rad, double highest_rad,
+                                       double speed_rad_s) noexcept TORSIO_REALTIME;
+
   /// @returns m [rad], v_max′ [rad/s]
   [[nodiscard]] double position_margin() const noexcept { return margin_rad_; }
   [[nodiscard]] double soft_speed() const noexcept { return soft_speed_rad_s_; }
@@ -227,6 +233,7 @@ class JointCascade {
   double braking_rad_s2_;      ///< a
   double margin_rad_;
   double soft_speed_rad_s_;
+  double largest_speed_rad_s_;  ///< limit of the construction, which the supply reaches
   double fault_keep_;
   double position_1_s_;
   Pid velocity_;

@@ -58,6 +58,13 @@ class JointControllerCore {
   Output step(const Estimate& wanted_rad, const JointSample& sample) noexcept TORSIO_REALTIME;
   /// As `JointCascade::track`.
   void track(double applied_A) noexcept TORSIO_REALTIME;
+  /// As `JointCascade::set_gains`, without effect on the modes of the spring.
+  [[nodiscard]] bool set_gains(const JointCascade::Gains& gains) noexcept TORSIO_REALTIME {
+    return cascade_.set_gains(gains);
+  }
+  /// As `JointCascade::set_motion_limits` and `TorqueLoopCore::set_largest_torque`, all or none.
+  [[nodiscard]] bool set_limits(double lowest_rad, double highest_rad, double speed_rad_s,
+                                double torque_Nm) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const JointCascade& cascade() const noexcept { return cascade_; }
   [[nodiscard]] const TorqueLoopCore& torque() const noexcept { return torque_; }
@@ -125,6 +132,14 @@ class JointController : public detail::SpringController<I, JointControllerCore> 
   }
   /// As `JointCascade::track`.
   void track(double applied_A) noexcept TORSIO_REALTIME { Base::own_core().track(applied_A); }
+  /// As `JointControllerCore::set_gains` and `set_limits`.
+  [[nodiscard]] bool set_gains(const JointCascade::Gains& gains) noexcept TORSIO_REALTIME {
+    return Base::own_core().set_gains(gains);
+  }
+  [[nodiscard]] bool set_limits(double lowest_rad, double highest_rad, double speed_rad_s,
+                                double torque_Nm) noexcept TORSIO_REALTIME {
+    return Base::own_core().set_limits(lowest_rad, highest_rad, speed_rad_s, torque_Nm);
+  }
 };
 
 }  // namespace torsio

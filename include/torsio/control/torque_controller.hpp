@@ -112,6 +112,8 @@ class TorqueLoopCore {
   /// The whole current of the motor in the last tick, for the disturbance observer, where another
   /// controller adds to that of the last step. Not finite: changes nothing.
   void set_motor_current(double current_A) noexcept TORSIO_REALTIME;
+  /// Limit of the wanted torque, from the next step on. @returns false, and it is kept, if it is not positive
+  [[nodiscard]] bool set_largest_torque(double torque_Nm) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const DeflectionController& deflection() const noexcept { return deflection_; }
   [[nodiscard]] DeflectionController& deflection() noexcept { return deflection_; }

@@ -51,7 +51,7 @@ class Recorder {
   /// Called by one thread. `tick`: the period (`Tick::index`), later than the one before.
   /// @returns false if the frame was dropped.
   bool push(std::int64_t tick, std::span<const double> values) noexcept TORSIO_REALTIME;
-  /// Frames that were dropped because the ring was full; by any thread.
+  /// Frames that were dropped because the ring or the disk was full; by any thread.
   [[nodiscard]] std::uint64_t dropped() const noexcept;
 
   /// Writes the remaining frames, seals the file and syncs it. Not at the same time as `push`.

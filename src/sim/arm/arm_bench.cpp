@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 
 #include "torsio/actuator/electrical_sheet.hpp"
@@ -28,8 +29,11 @@ ArmBench::Joint::Joint(const DataSheet& sheet, const FaultSchedule& schedule, st
 
 ArmBench::ArmBench(const ArmSetup& setup, FirstStageForm form,
                    std::span<const FaultSchedule> faults, std::uint64_t seed,
-                   std::span<const double> start_rad)
-    : plant_(setup.arm, drives_of(setup), form),
+                   std::span<const double> start_rad, double longest_step_s)
+    : plant_(setup.arm, drives_of(setup), form,
+             longest_step_s > 0.0
+                 ? std::min(longest_step_s, ArmPlant::step_limit(setup.arm, drives_of(setup), form))
+                 : 0.0),
       samples_(setup.joints.size()),
       commands_(setup.joints.size()) {
   if (const Fault fault = plant_.reset(start_rad); fault != Fault::none)

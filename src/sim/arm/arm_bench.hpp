@@ -28,9 +28,10 @@ class ArmBench {
 
   /// At rest at these angles, the brakes closed.
   /// @param faults one schedule per joint, or none
+  /// @param longest_step_s of the integration, or shorter where the arm requires it; 0: that of `ArmPlant`
   /// @throws Error as `ArmPlant` does, UsageError as `FaultInjector`.
   ArmBench(const ArmSetup& setup, FirstStageForm form, std::span<const FaultSchedule> faults,
-           std::uint64_t seed, std::span<const double> start_rad);
+           std::uint64_t seed, std::span<const double> start_rad, double longest_step_s = 0.0);
 
   /// The signals of all joints at this tick, including faults.
   void sense();
@@ -43,6 +44,11 @@ class ArmBench {
   /// Advances to the next tick. @throws Error if the arm refuses.
   void act(std::span<const Command> commands, const ArmLoad& load);
 
+  /// Faults that are injected while it runs: first `FaultInjector::prepare`.
+  [[nodiscard]] FaultInjector& faults(std::size_t joint) noexcept {
+    joints_[joint].has_faults = true;
+    return joints_[joint].faults;
+  }
   [[nodiscard]] const ArmPlant& plant() const noexcept { return plant_; }
   /// From now on there is this plate.
   /// @param plate measured from the flange where it truly is, or in the frame of the base

@@ -73,6 +73,10 @@ class ArmPlant {
 
   /// As Plant's.
   Fault set_condition(std::size_t joint, const PlantCondition& condition) noexcept;
+  /// The stiffest stop [Nm/rad] of a joint's spring that its steps follow.
+  [[nodiscard]] double stiffest_stop(std::size_t joint) const noexcept {
+    return joints_[joint].stiffest_stop_Nm_rad;
+  }
   void use(std::size_t joint, const ElectricalDrive::Parameters& electrical) {
     joints_[joint].drive.use(electrical);
   }

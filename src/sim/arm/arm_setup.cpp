@@ -180,7 +180,7 @@ JointControllerCore::Settings control_of(const ArmJoint& joint, const DataSheet&
   return {.torque = {.deflection = {.joint = elastic}, .largest_torque_Nm = joint.effort_Nm},
           .limits = {.lowest_rad = joint.lowest_rad - wound_rad,
                      .highest_rad = joint.highest_rad + wound_rad,
-                     .speed_rad_s = sheet.rating.speed_rad_s.value,
+                     .speed_rad_s = speed_limit_of(sheet),
                      .max_unmeasured_load_Nm = kUnmeasuredShare * rated_Nm,
                      .max_measured_load_Nm = kMeasuredShare * rated_Nm},
           .override_rad_s = kOverride_rad_s,

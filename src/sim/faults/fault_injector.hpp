@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "sim/plant/plant.hpp"
@@ -27,6 +28,24 @@ class FaultInjector {
                 double run_s = std::numeric_limits<double>::infinity());
 
   void reset() noexcept;
+
+  /// A fault that is not in the schedule, of a sensor or, if `value` is null, of a part.
+  struct Injection {
+    FaultKind kind = FaultKind::freeze;
+    double Measurement::*value = nullptr;
+    bool Measurement::*is_fresh = nullptr;
+    double PlantCondition::*factor = nullptr;  ///< what a fault of a part changes; null: a stop
+    double start_s = 0.0;
+    double end_s = std::numeric_limits<double>::infinity();
+    double amount = 0.0;  ///< in the unit of the measurement
+    double stop_stiffness_Nm_rad = 0.0;
+  };
+  /// Space for `faults` injections of each of these sensors, and of the parts. Allocates.
+  void prepare(std::span<const Injection> sensors, std::size_t faults);
+  /// @returns false, and nothing changes, if every space is in use, or none was prepared
+  [[nodiscard]] bool inject(const Injection& injection) noexcept TORSIO_REALTIME;
+  /// Ends all injections; those of the schedule stay.
+  void end_injections() noexcept TORSIO_REALTIME;
 
   /// Call once per tick, with increasing times.
   void apply(Measurement& measured, double time_s) noexcept TORSIO_REALTIME;
@@ -53,6 +72,7 @@ class FaultInjector {
     bool Measurement::*is_fresh;
     std::vector<SensorFault> faults = {};
     std::optional<double> delivered = {};
+    std::size_t scheduled = 0;  ///< the faults of the schedule come first
   };
   struct PartFault {
     double PlantCondition::*factor;  ///< null: a stop
@@ -61,11 +81,13 @@ class FaultInjector {
     double over_s = 0.0;
     double stop_stiffness_Nm_rad = 0.0;
   };
+  Sensor& sensor_of(double Measurement::*value, bool Measurement::*is_fresh);
   void add_sensor_fault(const ScheduledFault& fault, const Window& window, const DataSheet& sheet);
   static double changed(SensorFault& fault, double value, double time_s) noexcept TORSIO_REALTIME;
 
   std::vector<Sensor> sensors_;
   std::vector<PartFault> parts_;
+  std::size_t scheduled_parts_ = 0;
 };
 
 }  // namespace torsio

@@ -44,23 +44,74 @@ FaultInjector::FaultInjector(const FaultSchedule& schedule, const DataSheet& she
           {rule.factor, window, fault.amount, fault.over_s, fault.stop_stiffness_Nm_rad});
     }
   }
+  scheduled_parts_ = parts_.size();
+}
+
+FaultInjector::Sensor& FaultInjector::sensor_of(double Measurement::*value,
+                                                bool Measurement::*is_fresh) {
+  const auto sensor = std::ranges::find(sensors_, value, &Sensor::value);
+  if (sensor != sensors_.end()) return *sensor;
+  return sensors_.emplace_back(Sensor{.value = value, .is_fresh = is_fresh});
+}
+
+void FaultInjector::prepare(std::span<const Injection> sensors, std::size_t faults) {
+  for (const Injection& each : sensors) {
+    Sensor& sensor = sensor_of(each.value, each.is_fresh);
+    sensor.faults.reserve(sensor.scheduled + faults);
+  }
+  parts_.reserve(scheduled_parts_ + faults);
+}
+
+bool FaultInjector::inject(const Injection& injection) noexcept {
+  const Window window{injection.start_s, injection.end_s};
+  // What has ended frees its space.
+  const auto has_ended = [&](const auto& fault) { return fault.window.end_s <= window.start_s; };
+  if (injection.value == nullptr) {
+    parts_.erase(std::remove_if(parts_.begin() + static_cast<std::ptrdiff_t>(scheduled_parts_),
+                                parts_.end(), has_ended),
+                 parts_.end());
+    if (parts_.size() == parts_.capacity()) return false;
+    parts_.push_back({.factor = injection.factor,
+                      .window = window,
+                      .amount = injection.amount,
+                      .stop_stiffness_Nm_rad = injection.stop_stiffness_Nm_rad});
+    return true;
+  }
+  const auto sensor = std::ranges::find(sensors_, injection.value, &Sensor::value);
+  if (sensor == sensors_.end()) return false;
+  std::vector<SensorFault>& faults = sensor->faults;
+  faults.erase(std::remove_if(faults.begin() + static_cast<std::ptrdiff_t>(sensor->scheduled),
+                              faults.end(), has_ended),
+               faults.end());
+  if (faults.size() == faults.capacity()) return false;
+  faults.push_back({.kind = injection.kind,
+                    .window = window,
+                    .amount = injection.amount,
+                    .next_s = window.start_s});
+  return true;
+}
+
+void FaultInjector::end_injections() noexcept {
+  for (Sensor& sensor : sensors_)
+    sensor.faults.erase(sensor.faults.begin() + static_cast<std::ptrdiff_t>(sensor.scheduled),
+                        sensor.faults.end());
+  parts_.erase(parts_.begin() + static_cast<std::ptrdiff_t>(scheduled_parts_), parts_.end());
 }
 
 void FaultInjector::add_sensor_fault(const ScheduledFault& fault, const Window& window,
                                      const DataSheet& sheet) {
   const auto channels = sensed_channels(sheet);
   const SensedChannel& channel = *std::ranges::find(channels, fault.what, &SensedChannel::name);
-  auto sensor = std::ranges::find(sensors_, channel.value, &Sensor::value);
-  if (sensor == sensors_.end())
-    sensor = sensors_.insert(sensor, Sensor{.value = channel.value, .is_fresh = channel.is_fresh});
+  Sensor& sensor = sensor_of(channel.value, channel.is_fresh);
   double amount = fault.amount / channel.scale;
   if (fault.kind == FaultKind::gain) amount = fault.amount;
   if (fault.kind == FaultKind::wrap) amount = 2.0 * std::numbers::pi * fault.amount;
-  sensor->faults.push_back({.kind = fault.kind,
-                            .window = window,
-                            .amount = amount,
-                            .every_s = fault.every_s,
-                            .next_s = window.start_s});
+  ++sensor.scheduled;
+  sensor.faults.push_back({.kind = fault.kind,
+                           .window = window,
+                           .amount = amount,
+                           .every_s = fault.every_s,
+                           .next_s = window.start_s});
 }
 
 void FaultInjector::reset() noexcept {

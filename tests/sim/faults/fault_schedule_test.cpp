@@ -526,5 +526,38 @@ TEST(SimulateWithFaults, AWeakMotorNeedsMoreCurrent) {
               2.0, 0.2);
 }
 
+TEST(FaultInjector, InjectsInPreparedSpaceAndKeepsItsSchedule) {
+  using Injection = FaultInjector::Injection;
+  FaultInjector injector({{gear(FaultKind::jump, 1.0)}}, data_sheet("dfki-50"));
+  const Injection jump{.kind = FaultKind::jump,
+                       .value = &Measurement::middle_angle_rad,
+                       .is_fresh = &Measurement::is_middle_angle_fresh,
+                       .amount = 0.5};
+  const auto angle_at = [&](double time_s) {
+    Measurement measured{.middle_angle_rad = 0.25};
+    injector.apply(measured, time_s);
+    return measured.middle_angle_rad;
+  };
+  injector.prepare(std::vector{jump}, 2);
+  EXPECT_TRUE(injector.inject(jump));
+  EXPECT_EQ(angle_at(0.0), 0.75);
+  Injection short_one = jump;
+  short_one.end_s = 0.02;
+  EXPECT_TRUE(injector.inject(short_one));
+  EXPECT_FALSE(injector.inject(jump)) << "no space";
+  EXPECT_EQ(angle_at(0.01), 1.25);
+  Injection later = jump;
+  later.start_s = 0.02;
+  EXPECT_TRUE(injector.inject(later)) << "one has ended";
+  EXPECT_EQ(angle_at(0.04), 2.25) << "with that of the schedule";
+  injector.end_injections();
+  EXPECT_EQ(angle_at(0.041), 1.25);
+  Injection part{.factor = &PlantCondition::friction_factor, .amount = 2.0};
+  EXPECT_TRUE(injector.inject(part));
+  EXPECT_EQ(injector.condition(0.05).friction_factor, 2.0);
+  injector.end_injections();
+  EXPECT_EQ(injector.condition(0.05).friction_factor, 1.0);
+}
+
 }  // namespace
 }  // namespace torsio

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <string>
+#include <vector>
+
+#include "common/output.hpp"
+#include "torsio/link/joint_connection.hpp"
+
+/// The line to a joint and the ids on it, for every verb below `torsio connect`.
+struct ConnectFlags {
+  torsio::JointLine line = {};
+  unsigned joint = 1;
+  unsigned id = 254;
+  std::string timeout = "100ms";
+  bool is_lenient = false;
+  JsonOutput json = {};
+
+  /// All but `--joint`.
+  void add_line(CLI::App& verb);
+  void add(CLI::App& verb);
+  [[nodiscard]] torsio::JointConnection::Settings settings() const;
+  [[nodiscard]] torsio::JointConnection connection() const;
+};
+
+// The verbs below `torsio connect` that are not in connect.cpp.
+
+void add_connect_watch(CLI::App& connect);
+void add_connect_record(CLI::App& connect);
+void add_connect_play(CLI::App& connect);
+void add_connect_commands(CLI::App& connect);
+void add_connect_proxy(CLI::App& connect);

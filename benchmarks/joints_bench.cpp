@@ -1,0 +1,129 @@
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rows.hpp"
+#include "torsio/link.hpp"
+#include "torsio/realtime/realtime_loop.hpp"
+#include "torsio/sim/joints/joint_server.hpp"
+#include "torsio/sim/joints/single_joint.hpp"
+
+namespace torsio::bench {
+namespace {
+
+constexpr std::uint8_t kJoints = 12;
+constexpr std::uint8_t kHost = 254;
+constexpr int kCycles = 10000;
+constexpr double kPeriod_s = 3e-4;  // shorter than a tick, which changes nothing for the joints
+constexpr std::uint64_t kTick_ns = 1'000'000;
+constexpr std::array kActuators = {"dfki-300", "dfki-300", "dfki-120",
+                                   "dfki-50",  "dfki-28",  "dfki-28"};
+
+/// Twelve joints on UDP and a host that drives and observes them all at 1 kHz.
+class DrivenJoints {
+ public:
+  DrivenJoints() {
+    for (std::uint8_t n = 0; n < kJoints; ++n)
+      hosts_.emplace_back(
+          HostEndpoint::Settings{.id = kHost, .joint = static_cast<std::uint8_t>(n + 1)});
+    run(100);
+    for (HostEndpoint& host : hosts_)
+      send(host, LinkSubscribe{.mask = 0x3FF, .rate_Hz = 1000.0F, .lifetime_s = 60.0F});
+    run(100);
+    for (HostEndpoint& host : hosts_)
+      send(host, LinkStateChange{.command = LinkStateCommand::enable});
+    for (int n = 0; n < 1000; ++n) {
+      for (HostEndpoint& host : hosts_)
+        send(host, LinkStateChange{.command = LinkStateCommand::heartbeat});
+      run(1);
+    }
+  }
+
+  DurationHistogram drive() {
+    cpu_time_ = {};
+    // With the priority of the program's own loop, if that is permitted.
+    RealtimeLoop loop({.period_s = kPeriod_s});
+    int cycles = 0;
+    static_cast<void>(loop.run([&](const Tick&) noexcept {
+      for (HostEndpoint& host : hosts_)
+        send(host, LinkReference{.deadline_ns = host.clock_ns() + 40 * kTick_ns,
+                                 .mode = JointMode::impedance,
+                                 .position_rad = 0.2F,
+                                 .stiffness_Nm_rad = 50.0F,
+                                 .damping_Nms_rad = 5.0F});
+      run(1);
+      return ++cycles < kCycles;
+    }));
+    for (const auto& joint : server_.joints())
+      if (joint.state != LinkDriveState::enabled) throw std::runtime_error("a joint has stopped");
+    return cpu_time_;
+  }
+
+ private:
+  static std::uint16_t free_port() {
+    const std::string place = open_udp({.listen = {.port = 0}, .peers = {{.port = 9}}})->place();
+    return static_cast<std::uint16_t>(std::stoi(place.substr(place.find(':') + 1)));
+  }
+  static std::vector<ServedArm> arms() {
+    std::vector<ServedArm> all;
+    for (std::uint8_t n = 0; n < kJoints; ++n)
+      all.push_back({.setup = single_joint_setup(data_sheet(kActuators[n % kActuators.size()])),
+                     .first_id = static_cast<std::uint8_t>(n + 1)});
+    return all;
+  }
+
+  template <class Message>
+  void send(HostEndpoint& host, const Message& message) {
+    if (bundled_ + kNdlcomMaxEncodedBytes > bundle_.size()) flush();
+    bundled_ += host.build(message, std::span(bundle_).subspan(bundled_));
+  }
+  /// A datagram may carry several frames.
+  void flush() { host_line_->send(std::span(bundle_).first(std::exchange(bundled_, 0))); }
+  void run(int cycles) {
+    std::array<std::uint8_t, 2048> bytes;
+    for (; cycles > 0; --cycles) {
+      if (bundled_ > 0) flush();
+      const std::int64_t start_ns = clock_.cpu_ns();
+      server_.cycle(now_ns_ += kTick_ns);
+      cpu_time_.add(clock_.cpu_ns() - start_ns);
+      while (const std::size_t size = host_line_->receive(bytes))
+        for (HostEndpoint& host : hosts_)
+          host.receive(std::span(bytes).first(size), [](const auto&) {});
+    }
+  }
+
+  std::uint16_t joint_port_ = free_port();
+  std::uint16_t host_port_ = free_port();
+  std::unique_ptr<LinkTransport> joint_line_ =
+      open_udp({.listen = {.port = joint_port_}, .peers = {{.port = host_port_}}});
+  std::unique_ptr<LinkTransport> host_line_ =
+      open_udp({.listen = {.port = host_port_}, .peers = {{.port = joint_port_}}});
+  JointServer server_{arms(), {}, *joint_line_};
+  std::deque<HostEndpoint> hosts_;
+  std::array<std::uint8_t, 1400> bundle_ = {};
+  std::size_t bundled_ = 0;
+  MonotonicClock clock_;
+  DurationHistogram cpu_time_;
+  std::uint64_t now_ns_ = std::uint64_t{1} << 41U;
+};
+
+Row cycle_row(double part) {
+  const DurationHistogram cpu_time = DrivenJoints().drive();
+  return {.value = 1e-3 * static_cast<double>(cpu_time.quantile_ns(part)), .unit = "us"};
+}
+
+}  // namespace
+
+/// CPU time of a cycle of twelve simulated joints in one server, each with a reference and telemetry of ten channels
+/// over UDP: the median.
+Row joints_cycle() { return cycle_row(0.5); }
+/// The same: exceeded by one cycle of a thousand.
+Row joints_cycle_p999() { return cycle_row(0.999); }
+
+}  // namespace torsio::bench

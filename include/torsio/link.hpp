@@ -1,0 +1,23 @@
+#pragma once
+
+// Start here to reach a joint over a line of bytes, or to be reached.
+//
+//   JointEndpoint    the joint's side: bytes in, calls of a `LinkJoint` and its registers, frames out
+//   HostEndpoint     the host's side: messages to frames, bytes to messages, the joint's clock and the sequence of commands
+//   JointConnection  the host's side for programs of a person: calls that wait for the reply, by names of registers
+//   RegisterTable    parameters and measured values with unit, range and access
+//   NdlcomDecoder    frames of NDLCom from a stream of bytes; `encode_ndlcom` writes them
+
+#include "torsio/link/command_guard.hpp"
+#include "torsio/link/drive_state.hpp"
+#include "torsio/link/frame_counters.hpp"
+#include "torsio/link/host_endpoint.hpp"
+#include "torsio/link/hostile_wire.hpp"
+#include "torsio/link/joint_connection.hpp"
+#include "torsio/link/joint_endpoint.hpp"
+#include "torsio/link/joint_line.hpp"
+#include "torsio/link/line_budget.hpp"
+#include "torsio/link/link_messages.hpp"
+#include "torsio/link/link_transport.hpp"
+#include "torsio/link/ndlcom_frame.hpp"
+#include "torsio/link/register_table.hpp"
