@@ -41,7 +41,7 @@ std::vector<std::string> part_names(const CLI::App& verb) {
 
 /// The options of a verb and, where it has verbs below it, a case for each of those.
 std::string bash_words(const CLI::App& verb) {
-  const std::string own = fmt::format("words='{}'", fmt::join(option_names(verb), " "));
+  std::string own = fmt::format("words='{}'", fmt::join(option_names(verb), " "));
   const std::vector<std::string> parts = part_names(verb);
   if (parts.empty()) return own;
   std::string cases;
@@ -74,7 +74,7 @@ std::string bash_script(const CLI::App& app) {
 
 /// As `bash_words`.
 std::string zsh_words(const CLI::App& verb) {
-  const std::string own = fmt::format("compadd -- {}", fmt::join(option_names(verb), " "));
+  std::string own = fmt::format("compadd -- {}", fmt::join(option_names(verb), " "));
   if (part_names(verb).empty()) return own;
   std::string cases;
   for (const CLI::App* part : verbs_of(verb))
