@@ -90,7 +90,7 @@ class UdpTransport : public LinkTransport {
         return peer.sin_addr.s_addr == from.sin_addr.s_addr;
       });
       if (is_peer && got > 0) return static_cast<std::size_t>(got);
-      counts_.foreign += is_peer ? 0U : 1U;
+      count().foreign += is_peer ? 0U : 1U;
     }
   }
 
@@ -100,7 +100,7 @@ class UdpTransport : public LinkTransport {
       is_sent = ::sendto(socket_.number(), frame.data(), frame.size(), MSG_NOSIGNAL,
                          as_general(peer), sizeof(peer)) == static_cast<ssize_t>(frame.size()) &&
                 is_sent;
-    counts_.not_sent += is_sent ? 0U : 1U;
+    count().not_sent += is_sent ? 0U : 1U;
     return is_sent;
   }
 
@@ -154,7 +154,7 @@ class UnixTransport : public LinkTransport {
     const bool is_sent =
         ::sendto(socket_.number(), frame.data(), frame.size(), MSG_NOSIGNAL, as_general(peer_),
                  sizeof(peer_)) == static_cast<ssize_t>(frame.size());
-    counts_.not_sent += is_sent ? 0U : 1U;
+    count().not_sent += is_sent ? 0U : 1U;
     return is_sent;
   }
 

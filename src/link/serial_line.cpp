@@ -46,7 +46,7 @@ class ByteLine : public LinkTransport {
       left_ = std::span(rest_).first(frame.size());
       flush();
     }
-    counts_.not_sent += is_taken ? 0U : 1U;
+    count().not_sent += is_taken ? 0U : 1U;
     return is_taken;
   }
   int descriptor() const noexcept override { return line_.number(); }

@@ -40,6 +40,9 @@ class LinkTransport : public LinkSink {
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
 
  protected:
+  Counts& count() noexcept { return counts_; }
+
+ private:
   Counts counts_ = {};
 };
 
