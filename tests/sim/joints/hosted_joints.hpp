@@ -36,7 +36,7 @@ class MemoryLine : public LinkTransport {
   }
   bool send(std::span<const std::uint8_t> frame) noexcept override {
     if (!is_read || to_hosts.size() + frame.size() > to_hosts.capacity()) {
-      ++counts_.not_sent;
+      ++count().not_sent;
       return false;
     }
     to_hosts.insert(to_hosts.end(), frame.begin(), frame.end());
