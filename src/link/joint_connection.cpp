@@ -67,18 +67,8 @@ std::optional<double> as_number(const JointConnection::Value& value) {
 /// The value in the type of the register. A text in it refers to `value`.
 LinkValue link_value(const JointConnection::Register& described,
                      const JointConnection::Value& value) {
-  const auto of = [](const auto& held) { return LinkValue::of(held); };
-  const auto as_link = [&](const JointConnection::Value& each) {
-    if (const auto* text = std::get_if<std::string>(&each))
-      return LinkValue::of(std::string_view(*text));
-    return std::visit(
-        [&](const auto& held) {
-          if constexpr (std::is_same_v<std::remove_cvref_t<decltype(held)>, std::string>)
-            return LinkValue();
-          else
-            return of(held);
-        },
-        each);
+  const auto as_link = [](const JointConnection::Value& each) {
+    return std::visit([](const auto& held) { return LinkValue::of(held); }, each);
   };
   const LinkValue same = as_link(value);
   if (same.type == described.type) return same;

@@ -149,18 +149,13 @@ Cycles run_realtime(const JointFlags& flags, torsio::JointServer& server, JointL
 
 double us(std::int64_t duration_ns) { return 1e-3 * static_cast<double>(duration_ns); }
 
-std::uint64_t refused_of(const torsio::JointServer::JointStatus& joint) {
-  std::uint64_t sum = 0;
-  for (const std::uint64_t count : joint.counts.refused) sum += count;
-  return sum;
-}
-
 std::string summary(const Cycles& done, const torsio::JointServer& server) {
   torsio::TextTable table;
   table.header({"joint", "actuator", "state", "executed", "refused", "not sent"});
   for (const torsio::JointServer::JointStatus& joint : server.joints())
     table.row({fmt::format("{}", joint.id), joint.actuator, std::string(name(joint.state)),
-               fmt::format("{}", joint.counts.executed), fmt::format("{}", refused_of(joint)),
+               fmt::format("{}", joint.counts.executed),
+               fmt::format("{}", joint.counts.all_refused()),
                fmt::format("{}", joint.counts.not_sent)});
   const torsio::JointServer::LineStatus line = server.line();
   return table.text() +

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -109,6 +110,10 @@ class JointEndpoint {
     std::uint64_t stops = 0;           ///< messages that request one
     std::uint64_t not_sent = 0;        ///< frames that the sink did not take
     std::array<std::uint64_t, kLinkRefusals> refused = {};  ///< by reason, replied to or not
+
+    [[nodiscard]] std::uint64_t all_refused() const noexcept {
+      return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
+    }
   };
   static constexpr std::size_t kSubscribers = 4;
   static constexpr double kLongestLifetime_s = 60.0;

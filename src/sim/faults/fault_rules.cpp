@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <variant>
 
 #include "core/checks.hpp"
@@ -140,13 +141,9 @@ void check_turns(const ScheduledFault& fault) {
 void check_amount(const ScheduledFault& fault, const FaultRule& rule) {
   if (rule.amount_key.empty()) return;
   std::string_view unit = rule.amount_unit == "1" ? std::string_view{} : rule.amount_unit;
-  double value = fault.amount;
-  if (rule.part.empty()) {
-    if (rule.amount_unit.empty()) unit = channel_unit(fault.what);
-    // Only a resolution has no sign.
-    if (rule.kind != FaultKind::quantised) value = std::abs(value);
-  }
-  require_within(fault, rule.amount_key, value, rule.lowest, rule.highest, unit);
+  if (rule.part.empty() && rule.amount_unit.empty()) unit = channel_unit(fault.what);
+  require_within(fault, rule.amount_key, limited_amount(rule, fault.amount), rule.lowest,
+                 rule.highest, unit);
 }
 
 }  // namespace
@@ -182,6 +179,17 @@ const FaultRule* find_fault_rule(FaultKind kind, std::string_view part) noexcept
   for (const FaultRule& rule : kRules)
     if (rule.kind == kind && rule.part == part) return &rule;
   return nullptr;
+}
+
+double limited_amount(const FaultRule& rule, double amount) noexcept {
+  const bool has_sign = rule.part.empty() && rule.kind != FaultKind::quantised;
+  return has_sign ? std::abs(amount) : amount;
+}
+
+double measured_amount(FaultKind kind, double amount, double scale) noexcept {
+  if (kind == FaultKind::gain) return amount;
+  if (kind == FaultKind::wrap) return 2.0 * std::numbers::pi * amount;
+  return amount / scale;
 }
 
 std::vector<std::string> fault_names(std::string_view part) {

@@ -36,6 +36,11 @@ struct FaultRule {
                                                std::string_view part) noexcept;
 [[nodiscard]] const FaultRule* find_fault_rule(FaultKind kind, std::string_view part) noexcept;
 
+/// The amount as `lowest` and `highest` limit it: without its sign for a sensor, where only a resolution has none.
+[[nodiscard]] double limited_amount(const FaultRule& rule, double amount) noexcept;
+/// The amount of a sensor's fault in the unit of the measurement, of which the channel has `scale` times the number.
+[[nodiscard]] double measured_amount(FaultKind kind, double amount, double scale) noexcept;
+
 /// What can happen to a part, or to any sensor: names as a schedule writes them.
 [[nodiscard]] std::vector<std::string> fault_names(std::string_view part);
 

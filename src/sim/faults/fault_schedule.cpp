@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "sim/faults/fault_injector.hpp"
 #include "sim/faults/fault_rules.hpp"
@@ -66,11 +65,14 @@ bool FaultInjector::inject(const Injection& injection) noexcept {
   const Window window{injection.start_s, injection.end_s};
   // What has ended frees its space.
   const auto has_ended = [&](const auto& fault) { return fault.window.end_s <= window.start_s; };
+  const auto has_space = [&](auto& faults, std::size_t scheduled) {
+    faults.erase(std::remove_if(faults.begin() + static_cast<std::ptrdiff_t>(scheduled),
+                                faults.end(), has_ended),
+                 faults.end());
+    return faults.size() < faults.capacity();
+  };
   if (injection.value == nullptr) {
-    parts_.erase(std::remove_if(parts_.begin() + static_cast<std::ptrdiff_t>(scheduled_parts_),
-                                parts_.end(), has_ended),
-                 parts_.end());
-    if (parts_.size() == parts_.capacity()) return false;
+    if (!has_space(parts_, scheduled_parts_)) return false;
     parts_.push_back({.factor = injection.factor,
                       .window = window,
                       .amount = injection.amount,
@@ -78,16 +80,11 @@ bool FaultInjector::inject(const Injection& injection) noexcept {
     return true;
   }
   const auto sensor = std::ranges::find(sensors_, injection.value, &Sensor::value);
-  if (sensor == sensors_.end()) return false;
-  std::vector<SensorFault>& faults = sensor->faults;
-  faults.erase(std::remove_if(faults.begin() + static_cast<std::ptrdiff_t>(sensor->scheduled),
-                              faults.end(), has_ended),
-               faults.end());
-  if (faults.size() == faults.capacity()) return false;
-  faults.push_back({.kind = injection.kind,
-                    .window = window,
-                    .amount = injection.amount,
-                    .next_s = window.start_s});
+  if (sensor == sensors_.end() || !has_space(sensor->faults, sensor->scheduled)) return false;
+  sensor->faults.push_back({.kind = injection.kind,
+                            .window = window,
+                            .amount = injection.amount,
+                            .next_s = window.start_s});
   return true;
 }
 
@@ -103,13 +100,10 @@ void FaultInjector::add_sensor_fault(const ScheduledFault& fault, const Window& 
   const auto channels = sensed_channels(sheet);
   const SensedChannel& channel = *std::ranges::find(channels, fault.what, &SensedChannel::name);
   Sensor& sensor = sensor_of(channel.value, channel.is_fresh);
-  double amount = fault.amount / channel.scale;
-  if (fault.kind == FaultKind::gain) amount = fault.amount;
-  if (fault.kind == FaultKind::wrap) amount = 2.0 * std::numbers::pi * fault.amount;
   ++sensor.scheduled;
   sensor.faults.push_back({.kind = fault.kind,
                            .window = window,
-                           .amount = amount,
+                           .amount = measured_amount(fault.kind, fault.amount, channel.scale),
                            .every_s = fault.every_s,
                            .next_s = window.start_s});
 }

@@ -1,12 +1,14 @@
 #include "sim/joints/joint_faults.hpp"
 
 #include <cmath>
-#include <numbers>
 
 #include "sim/faults/fault_rules.hpp"
 
 namespace torsio {
 namespace {
+
+constexpr double kUnitScale =
+    1.0;  // the channels of the telemetry have the units of the measurement
 
 /// As `common_part_name`; empty for a fault of a sensor.
 std::string_view part_of(std::string_view fault) noexcept {
@@ -16,8 +18,7 @@ std::string_view part_of(std::string_view fault) noexcept {
 
 bool is_possible(const FaultRule& rule, double magnitude) noexcept {
   if (rule.amount_key.empty()) return true;
-  const bool has_sign = rule.part.empty() && rule.kind != FaultKind::quantised;
-  const double size = has_sign ? std::abs(magnitude) : magnitude;
+  const double size = limited_amount(rule, magnitude);
   if (!(size >= rule.lowest && size <= rule.highest)) return false;
   return rule.kind != FaultKind::wrap || magnitude == std::round(magnitude);
 }
@@ -59,7 +60,7 @@ LinkRefusal JointFaults::inject(FaultInjector& injector, const LinkInjectFault& 
       return LinkRefusal::out_of_range;
     injection.value = sensors_[fault.channel].value;
     injection.is_fresh = sensors_[fault.channel].is_fresh;
-    if (rule->kind == FaultKind::wrap) injection.amount *= 2.0 * std::numbers::pi;
+    injection.amount = measured_amount(rule->kind, fault.magnitude, kUnitScale);
   }
   return injector.inject(injection) ? LinkRefusal::none : LinkRefusal::not_in_this_state;
 }

@@ -1,7 +1,5 @@
 #include "sim/joints/joint_registers.hpp"
 
-#include <numeric>
-
 #include "sim/joints/linked_arm.hpp"
 #include "torsio/safety/monitor.hpp"
 
@@ -171,9 +169,8 @@ using Counts = JointEndpoint::Counts;
 void add_counters(ServedJoint& of, std::vector<LinkRegister>& all) {
   all.push_back(counter<[](const Counts& from) { return from.executed; }>(of, "executed_commands",
                                                                           "references included"));
-  all.push_back(counter<[](const Counts& from) {
-    return std::accumulate(from.refused.begin(), from.refused.end(), std::uint64_t{0});
-  }>(of, "refused_messages", "replied to or not"));
+  all.push_back(counter<[](const Counts& from) { return from.all_refused(); }>(
+      of, "refused_messages", "replied to or not"));
   all.push_back(counter<[](const Counts& from) { return from.stops; }>(
       of, "stops", "messages that request one"));
   all.push_back(counter<[](const Counts& from) { return from.unknown; }>(

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <deque>
-#include <numeric>
 #include <utility>
 
 #include "core/checks.hpp"
@@ -20,7 +19,6 @@ namespace torsio {
 namespace {
 
 constexpr auto kServerPlace = "joint server";
-constexpr double kTick_ns = 1e9 / kBenchRate_Hz;
 constexpr std::size_t kIds = 256;
 constexpr std::size_t kEvents = 4096;
 /// Datagrams of one tick: a host that sends more does not make the joints late.
@@ -28,11 +26,6 @@ constexpr int kReadsPerJoint = 8;
 constexpr std::uint64_t kRefusedEveryTicks = 1000;
 
 enum class ServerEvent : std::uint8_t { state, control, refused };
-
-std::uint64_t total_refused(const JointEndpoint& endpoint) noexcept {
-  const auto& refused = endpoint.counts().refused;
-  return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
-}
 
 /// Frames of one tick that a datagram carries together: on the way into the system each costs as much as twenty frames here.
 /// A line with a limited rate gets each frame by itself, since it may take one and not the next.
@@ -197,7 +190,7 @@ void JointServer::Parts::note_events() noexcept {
     }
     // Once per second, one joint after the other.
     if (tick_ % kRefusedEveryTicks != k) continue;
-    if (const std::uint64_t refused = total_refused(endpoint); refused != last.refused) {
+    if (const std::uint64_t refused = endpoint.counts().all_refused(); refused != last.refused) {
       note(k, ServerEvent::refused, static_cast<double>(refused - last.refused), 0.0);
       last.refused = refused;
     }

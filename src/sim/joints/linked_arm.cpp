@@ -38,14 +38,17 @@ bool is_fault(ArmStopCause cause) noexcept {
 }  // namespace
 
 LinkedArm::LinkedArm(ServedArm arm, bool has_gear_stage, std::uint64_t seed)
+    : LinkedArm(arm, arm_controller_settings(arm.setup), form_of(arm.setup, has_gear_stage), seed) {
+}
+
+LinkedArm::LinkedArm(ServedArm& arm, const ArmController::Settings& settings, FirstStageForm form,
+                     std::uint64_t seed)
     : arm_(std::move(arm)),
-      bench_(arm_.setup, form_of(arm_.setup, has_gear_stage), arm_.faults, seed,
-             start_angles(arm_.setup.arm),
-             form_of(arm_.setup, has_gear_stage) == FirstStageForm::rigid ? kRigidStep_s : 0.0),
-      controller_(arm_controller_settings(arm_.setup), kBenchRate_Hz),
+      bench_(arm_.setup, form, arm_.faults, seed, start_angles(arm_.setup.arm),
+             form == FirstStageForm::rigid ? kRigidStep_s : 0.0),
+      controller_(settings, kBenchRate_Hz),
       samples_(arm_.setup.joints.size()),
       commands_(arm_.setup.joints.size()) {
-  const ArmController::Settings settings = arm_controller_settings(arm_.setup);
   for (std::size_t j = 0; j < arm_.setup.joints.size(); ++j)
     joints_.push_back(std::make_unique<LinkedJoint>(*this, j, arm_.setup.joints[j].sheet,
                                                     arm_.setup.arm.joints[j], settings.joints[j],

@@ -62,6 +62,9 @@ class LinkedArm {
   void restart_filters() noexcept TORSIO_REALTIME { controller_.reset(); }
 
  private:
+  /// @param arm is moved from
+  LinkedArm(ServedArm& arm, const ArmController::Settings& settings, FirstStageForm form,
+            std::uint64_t seed);
   void open_brakes() noexcept;
   void find_faults() noexcept;
   void end_stop() noexcept;
