@@ -84,10 +84,12 @@ void save_contacts(const std::filesystem::path& path, const ContactsFile& file) 
 }
 
 ContactsFile read_contacts(const std::filesystem::path& path) {
-  const std::string place = path.string();
   const std::vector<std::byte> bytes = read_whole_file(path, kMaxContactsBytes);
-  const nlohmann::json parsed = parse_json(
-      {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, place, kContactsAdvice);
+  return parse_contacts({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, path.string());
+}
+
+ContactsFile parse_contacts(std::string_view text, const std::string& place) {
+  const nlohmann::json parsed = parse_json(text, place, kContactsAdvice);
   const JsonObject document(parsed, place, kContactsAdvice);
   if (!document.has("format") || document.text("format") != kContactsFormat)
     throw Error({.place = place,

@@ -239,6 +239,8 @@ class ArmController {
     detail::BumplessTransfer transfer;  ///< difference of the torques of two models
     bool is_exchanged = false;          ///< the model, since the last step
     double torque_zero_Nm = 0.0;
+    double spring_Nm =
+        0.0;  ///< the last estimate of the linear spring, for a joint without a model
     std::optional<MonitoredTorque> monitored;
     std::optional<detail::JointInputs> monitor_inputs;
     std::vector<SignalSample> monitor_samples;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/arm/contact_detector.hpp"
@@ -38,6 +39,9 @@ void save_contacts(const std::filesystem::path& path, const ContactsFile& file);
 /// @throws Error naming the entry: not JSON, another format or version, an entry that is missing, unknown or of another
 /// kind, hours that do not support the rate, or numbers that `ContactDetector` refuses.
 [[nodiscard]] ContactsFile read_contacts(const std::filesystem::path& path);
+
+/// The same for the text of a file, which errors name as `place`.
+[[nodiscard]] ContactsFile parse_contacts(std::string_view text, const std::string& place);
 
 /// @throws Error if the file belongs to another arm, other joints, another payload (by more than 1 g) or another observer.
 void require_contacts_of(const ContactsFile& file, const ArmModel& arm, double bandwidth_rad_s,

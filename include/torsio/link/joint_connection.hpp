@@ -82,8 +82,8 @@ class JointConnection {
   JointConnection(std::shared_ptr<LinkTransport> line, const std::string& place,
                   const Settings& settings);
   ~JointConnection();
-  JointConnection(JointConnection&&) noexcept;
-  JointConnection& operator=(JointConnection&&) noexcept;
+  JointConnection(JointConnection&& other) noexcept;
+  JointConnection& operator=(JointConnection&& other) noexcept;
 
   [[nodiscard]] Information information();
   /// The descriptions of all registers; they are requested once.

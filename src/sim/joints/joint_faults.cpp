@@ -56,10 +56,12 @@ LinkRefusal JointFaults::inject(FaultInjector& injector, const LinkInjectFault& 
                                      .stop_stiffness_Nm_rad = stop_Nm_rad_};
   if (fault.duration_s > 0.0F) injection.end_s = time_s + double{fault.duration_s};
   if (part.empty()) {
-    if (fault.channel >= sensors_.size() || sensors_[fault.channel].value == nullptr)
+    if (fault.channel >= sensors_.size()) return LinkRefusal::out_of_range;
+    const Sensor& sensor = sensors_[fault.channel];
+    if (sensor.value == nullptr || (rule->kind == FaultKind::wrap && !sensor.is_angle))
       return LinkRefusal::out_of_range;
-    injection.value = sensors_[fault.channel].value;
-    injection.is_fresh = sensors_[fault.channel].is_fresh;
+    injection.value = sensor.value;
+    injection.is_fresh = sensor.is_fresh;
     injection.amount = measured_amount(rule->kind, fault.magnitude, kUnitScale);
   }
   return injector.inject(injection) ? LinkRefusal::none : LinkRefusal::not_in_this_state;

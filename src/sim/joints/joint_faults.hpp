@@ -23,6 +23,7 @@ class JointFaults {
   struct Sensor {
     double Measurement::*value = nullptr;
     bool Measurement::*is_fresh = nullptr;
+    bool is_angle = false;  ///< whose encoder has turns
   };
   static constexpr std::size_t kPerSensor = 16;
 
@@ -30,8 +31,8 @@ class JointFaults {
   JointFaults(std::span<const Sensor> sensors, double stop_Nm_rad);
   void prepare(FaultInjector& injector) const;
 
-  /// @returns `none`; `unknown_value` for a fault without that name; `out_of_range` for a channel without a sensor or a
-  /// magnitude that is not possible; `not_in_this_state` if `kPerSensor` are in effect
+  /// @returns `none`; `unknown_value` for a fault without that name; `out_of_range` for a channel without a sensor, `wrap` of
+  /// another quantity than an angle, or a magnitude that is not possible; `not_in_this_state` if `kPerSensor` are in effect
   [[nodiscard]] LinkRefusal inject(FaultInjector& injector, const LinkInjectFault& fault,
                                    double time_s) const noexcept TORSIO_REALTIME;
 

@@ -37,9 +37,9 @@ constexpr std::array<std::string_view, kJointChannels> kChannelNames = {"motor_a
                                                                         "truth_external_torque_Nm"};
 
 constexpr auto kSensors = std::to_array<JointFaults::Sensor>({
-    {&Measurement::motor_angle_rad, &Measurement::is_motor_angle_fresh},
-    {&Measurement::middle_angle_rad, &Measurement::is_middle_angle_fresh},
-    {&Measurement::joint_angle_rad, &Measurement::is_joint_angle_fresh},
+    {&Measurement::motor_angle_rad, &Measurement::is_motor_angle_fresh, true},
+    {&Measurement::middle_angle_rad, &Measurement::is_middle_angle_fresh, true},
+    {&Measurement::joint_angle_rad, &Measurement::is_joint_angle_fresh, true},
     {},
     {&Measurement::motor_current_A, &Measurement::is_motor_current_fresh},
 });

@@ -245,6 +245,11 @@ TEST_F(AServedJoint, InjectsFaultsOfSensorsAndPartsAndEndsThem) {
       LinkRefusal::out_of_range);
   EXPECT_EQ(hosted_.command(joint_, LinkInjectFault{.fault = "friction", .magnitude = -1.0}),
             LinkRefusal::out_of_range);
+  // Only an encoder has turns, and only whole ones.
+  for (const LinkInjectFault& fault :
+       {LinkInjectFault{.fault = "wrap", .channel = 4, .magnitude = 1.0},
+        LinkInjectFault{.fault = "wrap", .channel = 0, .magnitude = 1.5}})
+    EXPECT_EQ(hosted_.command(joint_, fault), LinkRefusal::out_of_range) << fault.channel;
   for (int n = 0; n < 20; ++n)
     static_cast<void>(hosted_.command(joint_, LinkInjectFault{.fault = "jump", .magnitude = 0.1}));
   EXPECT_EQ(hosted_.command(joint_, LinkInjectFault{.fault = "jump", .magnitude = 0.1}),
