@@ -98,7 +98,7 @@ void add_learn_contacts(CLI::App& arm) {
   verb->add_option("--false-alarms-per-hour", flags->learning.false_alarms_per_hour,
                    "wanted rate (default: 3 / hours, the lowest that the hours support)");
   add_seed(*verb, flags->learning.seed, "seed of moves and noise");
-  verb->add_flag("--gears", flags->learning.has_gear_stage,
+  verb->add_flag("--gear-stage", flags->learning.has_gear_stage,
                  "with the elasticity of the gears: slower");
   verb->callback([flags] { run(*flags); });
 }
