@@ -25,6 +25,9 @@ struct Outcome {
 /// The built program, run through the shell in a folder of its own.
 class Program : public testing::Test {
  protected:
+  // Outcomes of studies that other calls kept must not be found.
+  Program() { ::setenv("XDG_CACHE_HOME", folder_.path("cache").c_str(), 1); }
+
   /// `arguments` as they would be typed after "torsio".
   Outcome torsio(const std::string& arguments) {
     return shell(std::string(TORSIO_PROGRAM) + " " + arguments);
