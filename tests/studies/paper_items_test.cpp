@@ -141,11 +141,11 @@ TEST(PaperResults, AreThoseOfTheTexts) {
   for (std::string line; std::getline(file, line);) {
     const std::vector<std::string> fields = fields_of(line);
     if (fields.size() > 7 && fields[7] == "result")
-      printed.insert(fields[0] + "," + fields[1] + "," + fields[5] + "," + fields[6]);
+      printed.insert(fields[0] + "," + fields[4] + "," + fields[5] + "," + fields[6]);
   }
   std::multiset<std::string> ours;
   for (const PaperResult& result : paper_results())
-    ours.insert(std::string(result.paper) + "," + std::string(result.item) + "," +
+    ours.insert(std::string(result.paper) + "," + std::string(result.quantity) + "," +
                 std::string(result.value) + "," + std::string(result.unit));
   EXPECT_EQ(ours, printed);
 }
