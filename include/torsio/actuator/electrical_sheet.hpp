@@ -9,8 +9,9 @@ namespace torsio {
 /// How the resistance of copper rises with its temperature, over its value at 20 degrees Celsius.
 inline constexpr double kCopperResistanceRise_1_K = 0.00393;
 
-/// The electrical and thermal side of an actuator's motor, SI. The papers print none of it but the
-/// 30 kHz of the modulation (001): the rest is assumed by the rules below, before any simulation.
+/// The electrical and thermal side of an actuator's motor, SI. Of these numbers the papers print only
+/// the 30 kHz of the modulation (001): the rest is assumed by the rules below, before any simulation.
+/// The 40 V and 69 A up to which the electronics of paper 003 work (section 2) are not among them.
 struct ElectricalSheet {
   SheetValue pole_pairs;            ///< as the order of the torque ripple, six times this
   SheetValue phase_resistance_Ohm;  ///< `kPhaseResistanceShare` of the sheet's

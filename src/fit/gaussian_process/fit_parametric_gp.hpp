@@ -19,8 +19,10 @@ namespace torsio {
 /// What the kernel's numbers theta descend on, sample by sample, while (m, S) takes each sample in:
 ///
 ///     paper        (16) = ((y - mu)^2 + Sigma) / (2 sigma^2) + ln sigma^2 / 2; plain gradient steps of
-///                  0.1 from 0.3 (the printed ln 0.3 read as a logarithm), no safeguard: expect it
-///                  to shrink to nothing (specification 3.3)
+///                  0.1 from 0.3 (the printed ln 0.3 read as a logarithm), no safeguard: theta_1 can
+///                  only shrink, with some seeds to nothing (specification 3.3). Not as printed:
+///                  theta_4 starts from 0, the variance of the noise from 0.1 of the target's, and
+///                  data are standardised
 ///     nlml         m . K^-1 m / 2 + ln det K / 2 (Raissi); the noise on (16)
 ///     elbo         (16) + KL(N(m, S) | N(0, K)) / H, H the number of samples
 ///     recommended  elbo; S half way back to K every 1000 samples of the first 80 %, so that learning

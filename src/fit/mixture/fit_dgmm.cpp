@@ -289,7 +289,7 @@ Fitted<Dgmm> fit_dgmm_paper(const TrainingData& data, const PaperDgmmOptions& op
   for (std::size_t i = 0; i < samples.rows; ++i) {
     if (i % kSamplesPerReport == 0)
       report_progress(progress, static_cast<double>(i) / static_cast<double>(samples.rows),
-                      "learning as printed");
+                      "learning by Algorithm 1");
     for (std::size_t j = 0; j < d; ++j) x[j] = (samples(i, j) - by.centre[j]) / by.scale[j];
     if (i < m) {
       std::copy(x.begin(), x.end(), means.row(i).begin());

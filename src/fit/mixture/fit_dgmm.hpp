@@ -103,11 +103,13 @@ struct PaperDgmmOptions {
   }
 };
 
-/// Algorithm 1 of paper 000 as printed, only with the sign of the mean's update corrected, for
-/// comparison: the first samples become the components, their covariances stay spread^2 I, and each
-/// later sample moves the nearest mean. No guards. It is expected to be worse than the linear
-/// model: at 1 kHz all components are created within the first half second, and a covariance
-/// without correlation makes the regression a kernel average (specification 3.1).
+/// Algorithm 1 of paper 000 with the sign of the mean's update corrected, for comparison: the first
+/// samples become the components, their covariances stay spread^2 I, and each later sample moves the
+/// nearest mean. Not in the algorithm: quantities are standardised, and a weight is the component's
+/// share of the samples; none of the numbers in `PaperDgmmOptions` is printed. No guards. It is
+/// expected to be worse than the linear model: at 1 kHz all components are created within the first
+/// half second, and a covariance without correlation makes the regression a kernel average
+/// (specification 3.1).
 [[nodiscard]] Fitted<Dgmm> fit_dgmm_paper(const TrainingData& data,
                                           const PaperDgmmOptions& options = {},
                                           const Progress& progress = {});

@@ -6,6 +6,8 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -130,21 +132,44 @@ TEST(FitParametricGp, PassesItsOptionsOnAndRefusesWrongOnes) {
   EXPECT_EQ(sparse.model.get_if<ParametricGp>()->parameters().weights.size(), 12U);
 }
 
-TEST(FitParametricGp, EveryModeMakesAModelAndAllButThePapersFindTheCurve) {
+TEST(FitParametricGp, EveryModeButThePapersFindsTheCurveWithEverySeed) {
   const TrainingData data = curve(2000);
-  for (const auto mode : {ParametricGpMode::paper, ParametricGpMode::nlml, ParametricGpMode::elbo,
-                          ParametricGpMode::recommended}) {
+  const auto error_of = [&](ParametricGpMode mode, std::uint64_t seed) {
     const auto fitted = fit_parametric_gp(
-        data, {.mode = mode, .kernel = "se", .updates = 5000, .refit = false}, {.seed = 2});
-    const double error = rmse<ParametricGp>(fitted.parameters);
-    EXPECT_TRUE(std::isfinite(error));
-    if (mode != ParametricGpMode::paper) {
-      EXPECT_LT(error, 0.15) << static_cast<int>(mode);
-    }
+        data, {.mode = mode, .kernel = "se", .updates = 5000, .refit = false}, {.seed = seed});
+    return rmse<ParametricGp>(fitted.parameters);
+  };
+  std::size_t lost = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    for (const auto mode :
+         {ParametricGpMode::nlml, ParametricGpMode::elbo, ParametricGpMode::recommended})
+      EXPECT_LT(error_of(mode, seed), 0.1) << static_cast<int>(mode) << ", seed " << seed;
+    // A constant has an error of 0.7.
+    if (error_of(ParametricGpMode::paper, seed) > 0.6) ++lost;
   }
+  EXPECT_GE(lost, 1U) << "plain steps of 0.1 have become safe";
   EXPECT_LT(rmse<ParametricGp>(
                 fit_variational_gp(data, {.kernel = "se", .inducing_points = 14}).parameters),
             0.03);
+}
+
+// Specification 3.3: (16) falls with the amplitude of the whole kernel at every sample.
+TEST(FitParametricGp, ThePapersStepsOnlyLowerTheAmplitude) {
+  const TrainingData data = curve(2000);
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    double before = 0.3;  // at the start
+    for (const std::size_t updates : {1U, 10U, 100U, 1000U, 5000U}) {
+      const auto fitted = fit_parametric_gp(
+          data,
+          {.mode = ParametricGpMode::paper, .kernel = "se", .updates = updates, .refit = false},
+          {.seed = seed});
+      const double amplitude = fitted.parameters.kernel.nodes.front().amplitude;
+      EXPECT_LE(amplitude, before) << updates << " updates, seed " << seed;
+      before = amplitude;
+    }
+    EXPECT_LT(before, 0.25) << "seed " << seed;
+    EXPECT_GT(before, 0.0);
+  }
 }
 
 TEST(FitParametricGp, LearnsNothingFromASampleAtWhichItsValuesAreNotFinite) {
