@@ -164,8 +164,8 @@ std::string paper_items_page() {
     page += fmt::format("| {} | {} | {} | {} | {} |\n", item.item, item.title, item.status,
                         run_text(item), outcome_text(item));
   }
-  page += fmt::format("\n## The {} printed results\n\nEach stands in one table.\n",
-                      kPaperResults.size());
+  page +=
+      fmt::format("\n## The {} printed results\n\nEach is in one table.\n", kPaperResults.size());
   for (const StudyInfo& study : studies()) page += results_page(study.name);
   page += results_page("planned");
   page += results_page("text");

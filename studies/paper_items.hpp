@@ -38,7 +38,7 @@ struct PaperResult {
 
 /// The items as a table for a terminal, with the expected times of the studies.
 [[nodiscard]] std::string paper_items_text();
-/// docs/papers.md: the items with their outcomes, and the table in which each printed result stands.
+/// docs/papers.md: the items with their outcomes, and the table in which each printed result is.
 [[nodiscard]] std::string paper_items_page();
 [[nodiscard]] std::string paper_items_json();
 

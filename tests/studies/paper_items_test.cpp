@@ -45,7 +45,7 @@ TEST(PaperItems, HaveAStatusAndWhatItNeeds) {
   std::set<std::string> names;
   for (const PaperItem& item : paper_items()) {
     SCOPED_TRACE(cited(item));
-    EXPECT_TRUE(names.insert(cited(item)).second) << "stands twice";
+    EXPECT_TRUE(names.insert(cited(item)).second) << "two lines";
     EXPECT_THAT(item.status, AnyOf("done", "partly", "planned", "not possible", "nothing to run"));
     EXPECT_THAT(item.verdict, AnyOf("reproduced", "order only", "not reproduced", "holds", ""));
     if (item.status == "done" || item.status == "partly") {
@@ -104,7 +104,7 @@ TEST(PaperItems, NameRunsThatExist) {
   }
 }
 
-TEST(PaperResults, StandInOneTableEach) {
+TEST(PaperResults, AreInOneTableEach) {
   for (const PaperResult& result : paper_results()) {
     SCOPED_TRACE(testing::Message() << result.paper << " " << result.item << " " << result.condition
                                     << " " << result.quantity << " " << result.value);
@@ -117,7 +117,7 @@ TEST(PaperResults, StandInOneTableEach) {
   EXPECT_EQ(paper_results().size(), 137U);
 }
 
-/// The fields of a line of a table in which a field with a comma stands in quotes.
+/// The fields of a line of a table in which a field with a comma has quotes.
 std::vector<std::string> fields_of(const std::string& line) {
   std::vector<std::string> fields(1);
   bool is_quoted = false;
