@@ -30,7 +30,7 @@ struct Twisted {
   design::CouplingTwist twist;
   std::optional<double> unit_Nm;  ///< torque at the angle of Table 2 for G = 1 MPa
 
-  /// Beta's difference from eta, the taper, is not printed.
+  /// Beta differs from eta in its tapering radius, whose size is not printed.
   [[nodiscard]] bool is_fitted() const { return unit_Nm && geometry != "beta"; }
 };
 
@@ -76,7 +76,7 @@ void add_rows(QuantityTable& table, const Twisted& each, double modulus_MPa) {
                         angle_deg ? "" : "not reached up to the printed twist"});
 }
 
-/// Figures 5 and 6 have both lobes up to 15 degrees: as far as the solver converges, on the coarse mesh.
+/// The strains of Figure 5 reach 15 degrees for both lobes: as far as the solver converges, on the coarse mesh.
 void add_curve(QuantityTable& table, const std::string& geometry,
                const design::CouplingTwist& twist, double length_mm, double modulus_MPa) {
   constexpr double kWanted_deg = 15.0;
@@ -85,13 +85,12 @@ void add_curve(QuantityTable& table, const std::string& geometry,
   };
   for (const auto& [name, lobe] :
        {std::pair{"compressed", &twist.compressed}, std::pair{"stretched", &twist.stretched}})
-    table.rows.push_back(
-        {geometry,
-         fmt::format("twist reached, {}", name),
-         reached(*lobe),
-         "deg",
-         {},
-         reached(*lobe) < kWanted_deg ? "Figures 5 and 6: 15 deg" : "as in Figures 5 and 6"});
+    table.rows.push_back({geometry,
+                          fmt::format("twist reached, {}", name),
+                          reached(*lobe),
+                          "deg",
+                          {},
+                          reached(*lobe) < kWanted_deg ? "Figure 5: 15 deg" : "as in Figure 5"});
   const auto curve = torque_curve(twist, length_mm, modulus_MPa);
   for (const double angle_deg : {3.0, 6.0, 9.0, 12.0, 15.0}) {
     const auto torque_Nm = design::torque_at(curve, angle_deg);
@@ -153,7 +152,7 @@ Study coupling_003(const StudyOptions& options, const Progress& progress) {
   study.notes.emplace_back(
       "This is a fit: the modulus is fitted on the torques beside which it is printed, and the "
       "assumed widths of the slots were chosen on the same table. Beta is excluded from the fit: "
-      "its only difference from eta, the taper, is not printed, and is assumed here.");
+      "it differs from eta in a tapering radius, whose size is not printed and is assumed here.");
   study.notes.emplace_back(
       "The strains near the ends of a bond are singular. The paper names neither its strain nor "
       "its "

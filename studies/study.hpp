@@ -174,7 +174,7 @@ struct StudyInfo {
   std::string_view paper;  ///< number and table or figure
   std::string_view title;
   Study (*run)(const StudyOptions& options, const Progress& progress);
-  double minutes;                              ///< about how long the default takes on two cores
+  double minutes = 0.0;                        ///< about how long the default takes on two cores
   std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
   bool must_be_named = false;  ///< needs recordings (TORSIO_DATA or ../shared/data) or a solver
   bool has_figures = false;    ///< `Study::figures` are set

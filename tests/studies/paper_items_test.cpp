@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <regex>
 #include <set>
 #include <sstream>
 #include <string>
@@ -19,7 +19,6 @@ namespace torsio {
 namespace {
 
 using testing::AnyOf;
-using testing::HasSubstr;
 using testing::StartsWith;
 
 const std::filesystem::path kSource = TORSIO_SOURCE;
@@ -34,13 +33,6 @@ std::string cited(const PaperItem& item) {
   return std::string(item.paper) + " " + std::string(item.item);
 }
 
-std::vector<std::string> runs_of(const PaperItem& item) {
-  const auto document = nlohmann::json::parse(paper_items_json());
-  for (const auto& entry : document["items"])
-    if (entry["paper"] == item.paper && entry["item"] == item.item) return entry["run"];
-  return {};
-}
-
 TEST(PaperItems, HaveAStatusAndWhatItNeeds) {
   std::set<std::string> names;
   for (const PaperItem& item : paper_items()) {
@@ -48,12 +40,9 @@ TEST(PaperItems, HaveAStatusAndWhatItNeeds) {
     EXPECT_TRUE(names.insert(cited(item)).second) << "two lines";
     EXPECT_THAT(item.status, AnyOf("done", "partly", "planned", "not possible", "nothing to run"));
     EXPECT_THAT(item.verdict, AnyOf("reproduced", "order only", "not reproduced", "holds", ""));
-    if (item.status == "done" || item.status == "partly") {
-      EXPECT_FALSE(item.run.empty());
-      EXPECT_FALSE(item.verdict.empty());
-    } else {
-      EXPECT_TRUE(item.verdict.empty());
-    }
+    const bool is_run = item.status == "done" || item.status == "partly";
+    EXPECT_EQ(!item.run.empty(), is_run);
+    EXPECT_TRUE(item.status == "partly" || !item.verdict.empty() == is_run);
     const bool needs_reason = item.status == "partly" || item.status == "planned" ||
                               item.status == "not possible" || item.verdict == "order only" ||
                               item.verdict == "not reproduced";
@@ -82,22 +71,25 @@ TEST(PaperItems, NameRunsThatExist) {
   std::string tests;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(kSource / "tests"))
     if (entry.path().extension() == ".cpp") tests += whole_text(entry.path());
-  const std::regex blank("\\s+");
-  tests = std::regex_replace(tests, blank, "");
-  for (const PaperItem& item : paper_items()) {
-    SCOPED_TRACE(cited(item));
-    for (const std::string& run : runs_of(item)) {
+  std::erase_if(tests, [](unsigned char letter) { return std::isspace(letter) != 0; });
+  const auto document = nlohmann::json::parse(paper_items_json());
+  for (const auto& item : document["items"]) {
+    SCOPED_TRACE(item["paper"].get<std::string>() + " " + item["item"].get<std::string>());
+    for (const std::string run : item["run"]) {
       if (run.starts_with("test: ")) {
         const std::string name = run.substr(6);
         const std::size_t dot = name.find('.');
         ASSERT_NE(dot, std::string::npos) << run;
-        EXPECT_THAT(tests, HasSubstr("(" + name.substr(0, dot) + "," + name.substr(dot + 1) + ")"))
+        const std::string head = "(" + name.substr(0, dot) + "," + name.substr(dot + 1);
+        // A property of rapidcheck has a third argument.
+        EXPECT_TRUE(tests.find(head + ")") != std::string::npos ||
+                    tests.find(head + ",()") != std::string::npos)
             << run;
       } else if (std::ranges::find(studies(), run, &StudyInfo::name) == studies().end()) {
         EXPECT_THAT(run, AnyOf(StartsWith("simulate "), StartsWith("design "),
                                StartsWith("monitor "), StartsWith("track "), StartsWith("arm "),
                                StartsWith("compare "), StartsWith("fit "), StartsWith("transfer "),
-                               StartsWith("attribute "), StartsWith("adapt "), StartsWith("joint "),
+                               StartsWith("attribute"), StartsWith("adapt"), StartsWith("joint "),
                                StartsWith("connect "), StartsWith("tune-loop ")));
       }
     }
