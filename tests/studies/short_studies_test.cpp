@@ -62,7 +62,7 @@ INSTANTIATE_TEST_SUITE_P(OfThePapers, ShortStudies,
                          testing::Values("002-design", "002-slow", "000-brake", "000-transfer",
                                          "001-inverse", "004-impedance", "few-data"),
                          name_of);
-// Those of a quarter of a minute and more.
+// These take a quarter of a minute and more.
 INSTANTIATE_TEST_SUITE_P(Long, ShortStudies,
                          testing::Values("004-encoders", "004-tubes", "arm-external"), name_of);
 
