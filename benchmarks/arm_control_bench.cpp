@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
@@ -17,6 +19,7 @@ namespace {
 
 constexpr double kRate_Hz = 1000.0;
 constexpr std::size_t kTicks = 12'000;
+constexpr double kGearStiffness_Nm_rad = 5e4;
 
 /// One model for each joint, trained on the moves of the arm.
 std::vector<ModelFile> models_of_joints(const char* family) {
@@ -31,10 +34,17 @@ std::vector<ModelFile> models_of_joints(const char* family) {
   return models;
 }
 
-/// Motor current and gear deflection beside the model of the spring.
-MonitoredTorque monitored(const ModelFile& model) {
-  std::vector<Estimator> sources = test::joint_sources();
-  sources.pop_back();
+/// Motor current and gear deflection beside the model of the spring. The gear of the simulated joint is rigid, and the
+/// current is also that of friction: both have wide error bars.
+MonitoredTorque monitored(const ModelFile& model, const Drive& drive) {
+  constexpr double kCurrentStd_Nm = 100.0;
+  constexpr double kGearStd_Nm = 1e4;
+  std::vector<Estimator> sources;
+  sources.push_back(test::proportional_source("motor_current_A", drive.torque_per_current(),
+                                              kRate_Hz, "torque_Nm", kCurrentStd_Nm));
+  sources.push_back(
+      test::proportional_source(fmt::format("motor_angle_rad / {} - gear_angle_rad", drive.ratio),
+                                kGearStiffness_Nm_rad, kRate_Hz, "torque_Nm", kGearStd_Nm));
   sources.push_back(make_estimator(model, kRate_Hz));
   return {test::torque_sources(std::move(sources)), test::joint_redundancy(),
           test::tolerant_monitor()};
@@ -47,7 +57,7 @@ ArmController controller(const std::vector<ModelFile>& models, bool is_monitored
     ArmController::Joint& joint = settings.joints[j];
     joint.inverse = AnyInverse::of(models[j].settings, models[j].parameters);
     if (is_monitored)
-      joint.monitored.emplace(monitored(models[j]));
+      joint.monitored.emplace(monitored(models[j], joint.control.torque.deflection.joint.drive));
     else
       joint.estimator.emplace(make_estimator(models[j], kRate_Hz));
   }

@@ -10,10 +10,11 @@
 
 namespace torsio::test {
 
-/// A source that estimates `gain` times one expression, with an error bar of 0.1 Nm.
+/// A source that estimates `gain` times one expression.
 inline Estimator proportional_source(const std::string& expression, double gain,
                                      double sample_rate_Hz = 1000.0,
-                                     const std::string& target = "torque_Nm") {
+                                     const std::string& target = "torque_Nm",
+                                     double std_dev_Nm = 0.1) {
   Linear::Parameters parameters;
   parameters.coefficients.values = Matrix(1, 2);
   parameters.coefficients.values.values = {0.0, gain};
@@ -22,8 +23,8 @@ inline Estimator proportional_source(const std::string& expression, double gain,
            .target = target,
            .zeroed_channels = {},
            .ranges = {.lowest = {-100.0}, .highest = {100.0}},
-           .fallback = {.intercept = 0.0, .slope = {gain}, .residual_std = 0.1},
-           .residuals = {.edges = {-1e3, 1e3}, .std_dev = {0.1}}},
+           .fallback = {.intercept = 0.0, .slope = {gain}, .residual_std = std_dev_Nm},
+           .residuals = {.edges = {-1e3, 1e3}, .std_dev = {std_dev_Nm}}},
           AnyModel(Linear(parameters))};
 }
 
