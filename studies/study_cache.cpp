@@ -118,6 +118,7 @@ void StudyCache::keep(const StudyInfo& study, const StudyOptions& options,
 std::filesystem::path study_cache_folder() {
   for (const auto& [variable, below] :
        {std::pair{"XDG_CACHE_HOME", ""}, std::pair{"HOME", ".cache"}}) {
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): the environment is not written
     const char* const value = std::getenv(variable);
     // A relative folder would be another one in each working directory.
     if (value != nullptr && value[0] == '/')

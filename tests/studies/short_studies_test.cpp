@@ -56,8 +56,9 @@ TEST_P(ShortStudies, MeasureEveryRow) {
 INSTANTIATE_TEST_SUITE_P(OfAll, ShortStudies,
                          testing::Values("001-inverse", "002-design", "002-slow", "000-brake",
                                          "000-transfer", "004-encoders", "004-impedance",
-                                         "004-tubes", "few-data", "arm-external"),
+                                         "004-tubes", "few-data"),
                          name_of);
+INSTANTIATE_TEST_SUITE_P(OfArms, ShortStudies, testing::Values("arm-external"), name_of);
 
 }  // namespace
 }  // namespace torsio
