@@ -105,9 +105,7 @@ class LinkedJoint final : public LinkJoint {
   [[nodiscard]] const Drive& drive() const noexcept { return drive_; }
   [[nodiscard]] double stiffness_Nm_rad() const noexcept { return stiffness_Nm_rad_; }
   [[nodiscard]] const std::string& actuator() const noexcept { return actuator_; }
-  [[nodiscard]] std::string_view model() const noexcept {
-    return std::string_view(model_.data(), model_size_);
-  }
+  [[nodiscard]] std::string_view model() const noexcept { return {model_.data(), model_size_}; }
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
   [[nodiscard]] const Limits& largest_limits() const noexcept { return largest_limits_; }
   /// @returns `out_of_range` if the controller cannot keep them, or they exclude the present position
