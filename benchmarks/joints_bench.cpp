@@ -4,10 +4,10 @@
 #include <deque>
 #include <memory>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
+#include "free_port.hpp"
 #include "rows.hpp"
 #include "torsio/link.hpp"
 #include "torsio/realtime/realtime_loop.hpp"
@@ -66,10 +66,6 @@ class DrivenJoints {
   }
 
  private:
-  static std::uint16_t free_port() {
-    const std::string place = open_udp({.listen = {.port = 0}, .peers = {{.port = 9}}})->place();
-    return static_cast<std::uint16_t>(std::stoi(place.substr(place.find(':') + 1)));
-  }
   static std::vector<ServedArm> arms() {
     std::vector<ServedArm> all;
     for (std::uint8_t n = 0; n < kJoints; ++n)
@@ -120,7 +116,7 @@ double quantile_us(const DurationHistogram& times, double part) {
 /// The same quantile of a loop that only calculates, as long as the median cycle: what this machine adds to it.
 double bare_quantile_us(double work_us, double part) {
   constexpr int kSteps = 1000;
-  const MonotonicClock clock;
+  MonotonicClock clock;
   double value = 1.0;
   const auto calculate = [&value](int steps) {
     for (int n = 0; n < steps; ++n) value = value * 1.000'000'1 + 1e-9;

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "free_port.hpp"
 #include "rows.hpp"
 #include "torsio/link.hpp"
 
@@ -42,11 +43,6 @@ class BenchJoint : public LinkJoint {
   std::span<const std::string_view> channels() const noexcept override { return {}; }
   void measure(std::span<float> /*values*/) const noexcept override {}
 };
-
-std::uint16_t free_port() {
-  const std::string place = open_udp({.listen = {.port = 0}, .peers = {{.port = 9}}})->place();
-  return static_cast<std::uint16_t>(std::stoi(place.substr(place.find(':') + 1)));
-}
 
 /// Replies to registers' reads by the endpoint, and to anything else with as many bytes as such a reply has.
 void serve(LinkTransport& transport, std::size_t reply_bytes, const std::atomic<bool>& is_over) {
