@@ -14,7 +14,8 @@ exit 0
 
 
 class Lint(RepositoryTest):
-    scripts = ("tools/lint", "tools/recent_sources", "tools/retired_words", "docs/vocabulary.retired")
+    scripts = ("tools/lint", "tools/recent_sources", "tools/source_includes.py", "tools/retired_words",
+               "docs/vocabulary.retired")
 
     def setUp(self):
         super().setUp()

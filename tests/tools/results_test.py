@@ -4,7 +4,7 @@ import unittest
 from repository import RepositoryTest
 
 TREE = {
-    "studies/paper_001.cpp": '#include "torsio/fit/line.hpp"\nint study();  // a comment\n',
+    "studies/paper_001.cpp": '#include "torsio/fit/line.hpp"\n#include "paper_figures.inc"\nint study();  // a comment\n',
     "studies/paper_003.cpp": "int other();\n",
     "include/torsio/fit/line.hpp": '#include "torsio/core/sum.hpp"\nint line();\n',
     "include/torsio/core/sum.hpp": "int sum();\n",
@@ -16,7 +16,7 @@ TREE = {
 
 
 class Results(RepositoryTest):
-    scripts = ("tools/results",)
+    scripts = ("tools/results", "tools/source_includes.py")
 
     def setUp(self):
         super().setUp()
@@ -41,7 +41,8 @@ class Results(RepositoryTest):
         self.assertEqual(self.results("--stale", "001"), "results: 0 of 1 are out of date\n")
         for name, text in (("studies/paper_001.cpp", TREE["studies/paper_001.cpp"].replace("a comment", "another")),
                            ("src/core/sum.cpp", TREE["src/core/sum.cpp"].replace(" { ", "\n{\n  ")),
-                           ("src/core/other.cpp", "int other() { return 4; }\n"), ("studies/paper_003.cpp", "int more();\n")):
+                           ("src/core/other.cpp", "int other() { return 4; }\n"), ("studies/paper_003.cpp", "int more();\n"),
+                           ("studies/paper_items.csv", "paper,item\n")):
             self.write(**{name: text})
             self.assertIn("0 of 1", self.results("--stale", "001"), name)
         for name, part in (("src/core/sum.cpp", "src/core"), ("src/fit/line.cpp", "src/fit"),
