@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <utility>
+#include <vector>
 
 #include "report/json_text.hpp"
 #include "studies/study.hpp"
@@ -42,7 +43,8 @@ const StudyInfo* study_of(std::string_view part) noexcept {
 
 std::string study_minutes(const PaperItem& item) {
   double minutes = 0.0;
-  for (const std::string_view name : studies_of(item)) minutes += study_of(name)->minutes;
+  for (const std::string_view part : parts_of(item.run))
+    if (const StudyInfo* const study = study_of(part)) minutes += study->minutes;
   return minutes > 0.0 ? duration_text(60.0 * minutes) : std::string();
 }
 
@@ -114,12 +116,6 @@ std::string results_page(std::string_view table) {
 
 std::span<const PaperItem> paper_items() noexcept { return kPaperItems; }
 std::span<const PaperResult> paper_results() noexcept { return kPaperResults; }
-
-std::vector<std::string_view> studies_of(const PaperItem& item) {
-  std::vector<std::string_view> found = parts_of(item.run);
-  std::erase_if(found, [](std::string_view part) { return study_of(part) == nullptr; });
-  return found;
-}
 
 std::string duration_text(double seconds) {
   if (seconds < 90.0) return fmt::format("{:.0f} s", seconds);

@@ -3,7 +3,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace torsio {
 
@@ -41,9 +40,6 @@ struct PaperResult {
 /// docs/papers.md: the items with their outcomes, and the table in which each printed result is.
 [[nodiscard]] std::string paper_items_page();
 [[nodiscard]] std::string paper_items_json();
-
-/// The studies in the `run` of an item: without calls of other verbs and tests.
-[[nodiscard]] std::vector<std::string_view> studies_of(const PaperItem& item);
 
 /// "40 s", "12 min" or "1.5 h".
 [[nodiscard]] std::string duration_text(double seconds);

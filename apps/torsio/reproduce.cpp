@@ -123,26 +123,27 @@ torsio::StudyOutcome outcome_of(const torsio::StudyInfo& info,
           .seconds = spent.count()};
 }
 
-/// Prints what is known and how long the others take, before the first begins.
-void announce(const std::vector<const torsio::StudyInfo*>& wanted, const ReproduceFlags& flags,
-              const KnownOutcomes& known) {
+/// Prints how many outcomes are known and how long the other items take, before the first begins.
+void announce(const std::vector<const torsio::StudyInfo*>& wanted,
+              const std::vector<std::optional<torsio::StudyOutcome>>& outcomes,
+              const torsio::StudyOptions& options) {
   double minutes = 0.0;
-  std::size_t is_known = 0;
-  for (const torsio::StudyInfo* info : wanted) {
-    if (known.find(*info, flags.options))
-      ++is_known;
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (outcomes[i])
+      ++known;
     else
-      minutes += info->minutes;
+      minutes += wanted[i]->minutes;
   }
   std::string text = fmt::format("{} item(s)", wanted.size());
-  if (is_known > 0)
-    text += fmt::format(", of which this program has run {} before (--fresh runs them again)",
-                        is_known);
-  if (minutes > 0.0 && !flags.options.is_quick)
-    text += fmt::format(
-        "; about {} on two cores",
-        torsio::duration_text(60.0 * minutes * static_cast<double>(flags.options.repeats) /
-                              static_cast<double>(torsio::StudyOptions().repeats)));
+  if (known > 0)
+    text +=
+        fmt::format(", of which this program has run {} before (--fresh runs them again)", known);
+  if (minutes > 0.0 && !options.is_quick)
+    text +=
+        fmt::format("; about {} on two cores",
+                    torsio::duration_text(60.0 * minutes * static_cast<double>(options.repeats) /
+                                          static_cast<double>(torsio::StudyOptions().repeats)));
   remark(text);
 }
 
@@ -165,16 +166,17 @@ std::vector<const torsio::StudyInfo*> wanted_studies(const ReproduceFlags& flags
   return wanted;
 }
 
-torsio::ReportDocument report_of(const ReproduceFlags& flags, std::size_t count) {
+torsio::ReportDocument report_of(const ReproduceFlags& flags,
+                                 std::vector<torsio::ReportSection> sections) {
   return {
       .title = "Experiments of the papers",
       .summary =
           {fmt::format(
                "{} experiment(s) on the simulated benches, our figures beside the published ones.",
-               count),
+               sections.size()),
            "The benches are models: agreement shows that a method works there, not on a real "
            "joint."},
-      .sections = {},
+      .sections = std::move(sections),
       .origin = {{"seed", fmt::format("{}", flags.options.seed)},
                  {"repeats", fmt::format("{}", flags.options.repeats)}}};
 }
@@ -196,11 +198,14 @@ void run(const ReproduceFlags& flags) {
   DataFlags().check_outputs({flags.json.destination, flags.plot, flags.report.destination});
   if (!flags.plot.empty()) static_cast<void>(torsio::plot_format(flags.plot));
   KnownOutcomes known(flags.is_fresh);
-  announce(wanted, flags, known);
+  std::vector<std::optional<torsio::StudyOutcome>> outcomes;
+  for (const torsio::StudyInfo* info : wanted) outcomes.push_back(known.find(*info, flags.options));
+  announce(wanted, outcomes, flags.options);
   auto documents = nlohmann::ordered_json::array();
-  torsio::ReportDocument report = report_of(flags, wanted.size());
-  for (const torsio::StudyInfo* info : wanted) {
-    std::optional<torsio::StudyOutcome> outcome = known.find(*info, flags.options);
+  std::vector<torsio::ReportSection> sections;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const torsio::StudyInfo* const info = wanted[i];
+    std::optional<torsio::StudyOutcome>& outcome = outcomes[i];
     if (!outcome) {
       try {
         outcome = outcome_of(*info, flags.options);
@@ -221,14 +226,14 @@ void run(const ReproduceFlags& flags) {
                                   .text = std::string(info->title),
                                   .preformatted = outcome->text};
     section.figures = outcome->figures;
-    report.sections.push_back(std::move(section));
+    sections.push_back(std::move(section));
     if (flags.json.wants_tables()) {
       print(outcome->text + "\n");
       flags.json.write(documents.dump(2) + "\n");  // after each: the next may take an hour
     }
   }
   if (!flags.json.wants_tables()) flags.json.write(documents.dump(2) + "\n");
-  if (flags.report.is_wanted()) flags.report.write(std::move(report));
+  if (flags.report.is_wanted()) flags.report.write(report_of(flags, std::move(sections)));
   if (!failed.empty())
     throw torsio::Error(
         {.place = "torsio reproduce",
