@@ -168,12 +168,13 @@ std::vector<const torsio::StudyInfo*> wanted_studies(const ReproduceFlags& flags
 
 torsio::ReportDocument report_of(const ReproduceFlags& flags,
                                  std::vector<torsio::ReportSection> sections) {
+  const std::size_t count = sections.size();
   return {
       .title = "Experiments of the papers",
       .summary =
           {fmt::format(
                "{} experiment(s) on the simulated benches, our figures beside the published ones.",
-               sections.size()),
+               count),
            "The benches are models: agreement shows that a method works there, not on a real "
            "joint."},
       .sections = std::move(sections),
@@ -199,6 +200,7 @@ void run(const ReproduceFlags& flags) {
   if (!flags.plot.empty()) static_cast<void>(torsio::plot_format(flags.plot));
   KnownOutcomes known(flags.is_fresh);
   std::vector<std::optional<torsio::StudyOutcome>> outcomes;
+  outcomes.reserve(wanted.size());
   for (const torsio::StudyInfo* info : wanted) outcomes.push_back(known.find(*info, flags.options));
   announce(wanted, outcomes, flags.options);
   auto documents = nlohmann::ordered_json::array();
