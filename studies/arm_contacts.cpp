@@ -55,6 +55,7 @@ ContactCase contact_case(const ArmSetup& setup, const char* family, double hours
 /// The pushes that are above the error bars of the learned springs.
 struct FoundPushes {
   std::size_t count = 0;
+  std::size_t in_contact = 0;  ///< not counted: parts of the contact before
   std::size_t in_first = 0;
   std::size_t in_second = 0;
   std::vector<double> latency_s = {};
@@ -64,7 +65,8 @@ FoundPushes found_pushes(const std::vector<PushTrial>& trials,
                          const std::vector<PushTrial>& chosen) {
   FoundPushes found;
   for (std::size_t k = 0; k < trials.size(); ++k) {
-    if (!chosen[k].is_above) continue;
+    if (trials[k].is_in_contact) ++found.in_contact;
+    if (!chosen[k].is_above || trials[k].is_in_contact) continue;
     ++found.count;
     const double latency_s = trials[k].latency_s.value_or(1.0);
     if (latency_s <= kFirstLatency_s) ++found.in_first;
@@ -103,12 +105,16 @@ void add_case(QuantityTable& table, const ContactCase& of, const ContactCase& le
   row("false alarms per hour, other motion", static_cast<double>(of.false_alarms) / hours, "1/h",
       fmt::format("{} in {:g} h; at most {:.3g} per hour with 95 % confidence", of.false_alarms,
                   hours, poisson_upper_95(of.false_alarms) / hours));
+  row("pushes before the end of the contact before",
+      100.0 * static_cast<double>(found.in_contact) / static_cast<double>(of.trials.size()), "%",
+      fmt::format("{} of {}, not counted", found.in_contact, of.trials.size()));
   row("largest factor k", of.largest_factor, "-", {});
-  if (&of == &learned)
-    row("pushes that are not above 5 error bars",
-        100.0 * (1.0 - static_cast<double>(found.count) / static_cast<double>(of.trials.size())),
-        "%",
-        fmt::format("{} of {}, not counted", of.trials.size() - found.count, of.trials.size()));
+  if (&of != &learned) return;
+  const auto below = static_cast<std::size_t>(
+      std::ranges::count_if(of.trials, [](const PushTrial& trial) { return !trial.is_above; }));
+  row("pushes that are not above 5 error bars",
+      100.0 * static_cast<double>(below) / static_cast<double>(of.trials.size()), "%",
+      fmt::format("{} of {}, not counted", below, of.trials.size()));
 }
 
 }  // namespace
@@ -124,7 +130,7 @@ Study arm_contacts(const StudyOptions& options, const Progress& progress) {
           "counted in as many other hours. Models of the springs are fitted to recordings of each "
           "joint's own bench. Pushes count whose torque is above 5 error bars of the learned "
           "springs at "
-          "some joint",
+          "some joint, and which begin after the contact before has ended",
       .unit = "Nm",
       .options = options};
   const auto repeats = static_cast<double>(options.repeats);

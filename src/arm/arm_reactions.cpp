@@ -9,9 +9,9 @@
 namespace torsio {
 namespace {
 
-// Below this share of the thresholds for this time, a contact is over: an error that stays near them is one contact.
-constexpr double kContactEndShare = 0.7;
-constexpr double kContactEnd_s = 0.2;
+// Below the thresholds for this time, a contact is over: an error that is about as large as they are is one contact. A lower
+// share of them would keep a contact for seconds where a factor is small: errors are often above half of it.
+constexpr double kContactEnd_s = 0.5;
 constexpr double kYielding_s = 0.3;  // time in which a reaction ends an overload
 
 }  // namespace
@@ -43,7 +43,7 @@ void ArmController::find_contact(const ArmReference& reference,
   for (std::size_t j = 0; j < joints_.size(); ++j)
     output_.joints[j].external_std_Nm = found.std_dev_Nm[j];
   if (!is_running || is_reacting_) return;
-  no_contact_s_ = found.largest_share < kContactEndShare ? no_contact_s_ + period_s_ : 0.0;
+  no_contact_s_ = found.is_contact ? 0.0 : no_contact_s_ + period_s_;
   if (no_contact_s_ > kContactEnd_s) output_.contact.is_found = false;
   if (!found.is_contact || output_.contact.is_found) return;
   output_.contact = {.is_found = true,

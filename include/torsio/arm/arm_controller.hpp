@@ -154,7 +154,7 @@ class ArmController {
   };
   /// The last contact.
   struct Contact {
-    /// A threshold is exceeded, or 0.7 of it was within 0.2 s; with a reaction until `end_reaction` or `release`.
+    /// A threshold is exceeded, or was within 0.5 s; with a reaction until `end_reaction` or `release`.
     bool is_found = false;
     std::size_t joint = 0;         ///< in which it was found
     double time_s = kNotMeasured;  ///< `JointSample::t_s` of that joint when it was found
@@ -301,7 +301,7 @@ class ArmController {
   ArmReference reacting_ = {};  ///< the reference that a reaction makes
   bool is_reacting_ = false;
   double reacting_s_ = 0.0;    ///< since the reaction began
-  double no_contact_s_ = 0.0;  ///< since the thresholds were approached
+  double no_contact_s_ = 0.0;  ///< since a threshold was exceeded
   bool is_started_ = false;
   bool is_holding_ = false;
   bool is_guided_ = false;  ///< in the last tick

@@ -63,11 +63,11 @@ std::vector<PushTrial> push_part(ArmFreeMotion& motion, const PushTrials& trials
     report_progress(progress, static_cast<double>(k) / static_cast<double>(count), "pushes");
     const std::size_t pause = ticks_of(random.uniform(kShortestPause_s, kLongestPause_s));
     const Vector3 force_N = trials.force_N * random_direction(random);
+    PushTrial trial;
     for (std::size_t tick = 0; tick < pause; ++tick) {
-      (void)motion.control();
+      trial.is_in_contact = motion.control().contact.is_found;
       motion.act({});
     }
-    PushTrial trial;
     bool was_found = true;  // in the first tick the force has not acted yet
     for (std::size_t tick = 0; tick < duration; ++tick) {
       const ArmController::Output& output = motion.control();

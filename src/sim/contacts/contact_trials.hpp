@@ -20,7 +20,8 @@ namespace torsio {
 
 /// One push on the flange of an arm in random motion.
 struct PushTrial {
-  bool is_above = false;  ///< |Jᵀ F| is above `kPushErrorBars` error bars at some joint
+  bool is_above = false;       ///< |Jᵀ F| is above `kPushErrorBars` error bars at some joint
+  bool is_in_contact = false;  ///< the contact before had not ended: the push is part of it
   std::optional<double> latency_s = {};  ///< until it was found; none: not while it lasted
 };
 inline constexpr double kPushErrorBars = 5.0;

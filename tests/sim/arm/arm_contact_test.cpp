@@ -146,6 +146,22 @@ TEST(ArmRun, DoesNotReactToAHandThatGuidesIt) {
   EXPECT_EQ(of.contacts.front().reaction, ContactReaction::none);
 }
 
+TEST(ArmRun, AContactEndsHalfASecondAfterTheLastThreshold) {
+  const auto push = [](double start_s) {
+    return ArmPush{.start_s = start_s, .duration_s = 0.1, .force_N = {0.0, 60.0, 0.0}};
+  };
+  const ArmRunSpec spec{.program = {.start_rad = kContactStart,
+                                    .steps = {{.task = ArmTask::hold,
+                                               .duration_s = 4.0,
+                                               .pushes = {push(0.8), push(1.35), push(3.0)}}}},
+                        .contacts = coarse_contacts(),
+                        .has_gear_stage = false};
+  const ArmRun of = run_arm(arm6_setup(), spec);
+  ASSERT_EQ(of.contacts.size(), 2U);
+  EXPECT_NEAR(of.contacts[0].found_s, 0.81, 0.02);
+  EXPECT_NEAR(of.contacts[1].found_s, 3.01, 0.02);
+}
+
 TEST(ArmRun, RefusesAReactionWithoutThresholds) {
   ArmRunSpec spec = onto_a_plate(ContactReaction::retract);
   spec.contacts.reset();
