@@ -92,7 +92,7 @@ void add_case(QuantityTable& table, const ContactCase& of, const ContactCase& le
                             : static_cast<double>(count) / static_cast<double>(found.count);
   };
   const auto verdict = [&](std::size_t count, double wanted) {
-    const std::string text = fmt::format("{} of {}", count, found.count);
+    std::string text = fmt::format("{} of {}", count, found.count);
     if (&of != &learned) return text;
     return text + fmt::format("; wanted {:g} %: {}", 100.0 * wanted,
                               share(count) >= wanted ? "met" : "missed");
