@@ -7,7 +7,6 @@ import time
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.linear_model import LinearRegression
 
 import torsio
 
@@ -31,10 +30,11 @@ def test_the_score_is_that_of_the_estimates(model, other_sweep):
 
 
 def test_linear_agrees_with_scikit_learn(sweep):
+    linear_model = pytest.importorskip("sklearn.linear_model")
     deflection = sweep["gear_angle_rad"] - sweep["joint_angle_rad"]
     model = torsio.fit(sweep, "linear", inputs="gear_angle_rad - joint_angle_rad")
     fresh = sweep.fresh("torque_Nm")
-    peer = LinearRegression().fit(deflection[fresh, None], sweep["torque_Nm"][fresh])
+    peer = linear_model.LinearRegression().fit(deflection[fresh, None], sweep["torque_Nm"][fresh])
     mine = torsio.estimate(model, sweep)
     np.testing.assert_allclose(mine.value, peer.predict(deflection[:, None]), atol=1e-6)
 
