@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,10 +53,9 @@ ContactCase contact_case(const ArmSetup& setup, const char* family, double hours
   return of;
 }
 
-/// The pushes that are above the error bars of the learned springs.
+/// The pushes that are above the error bars of the learned springs, and no part of the contact before.
 struct FoundPushes {
   std::size_t count = 0;
-  std::size_t in_contact = 0;  ///< not counted: parts of the contact before
   std::size_t in_first = 0;
   std::size_t in_second = 0;
   std::vector<double> latency_s = {};
@@ -65,7 +65,6 @@ FoundPushes found_pushes(const std::vector<PushTrial>& trials,
                          const std::vector<PushTrial>& chosen) {
   FoundPushes found;
   for (std::size_t k = 0; k < trials.size(); ++k) {
-    if (trials[k].is_in_contact) ++found.in_contact;
     if (!chosen[k].is_above || trials[k].is_in_contact) continue;
     ++found.count;
     const double latency_s = trials[k].latency_s.value_or(1.0);
@@ -105,16 +104,17 @@ void add_case(QuantityTable& table, const ContactCase& of, const ContactCase& le
   row("false alarms per hour, other motion", static_cast<double>(of.false_alarms) / hours, "1/h",
       fmt::format("{} in {:g} h; at most {:.3g} per hour with 95 % confidence", of.false_alarms,
                   hours, poisson_upper_95(of.false_alarms) / hours));
-  row("pushes before the end of the contact before",
-      100.0 * static_cast<double>(found.in_contact) / static_cast<double>(of.trials.size()), "%",
-      fmt::format("{} of {}, not counted", found.in_contact, of.trials.size()));
+  const auto left_out = [&](std::string quantity, std::ptrdiff_t count) {
+    row(std::move(quantity),
+        100.0 * static_cast<double>(count) / static_cast<double>(of.trials.size()), "%",
+        fmt::format("{} of {}, not counted", count, of.trials.size()));
+  };
+  left_out("pushes before the end of the contact before",
+           std::ranges::count(of.trials, true, &PushTrial::is_in_contact));
   row("largest factor k", of.largest_factor, "-", {});
-  if (&of != &learned) return;
-  const auto below = static_cast<std::size_t>(
-      std::ranges::count_if(of.trials, [](const PushTrial& trial) { return !trial.is_above; }));
-  row("pushes that are not above 5 error bars",
-      100.0 * static_cast<double>(below) / static_cast<double>(of.trials.size()), "%",
-      fmt::format("{} of {}, not counted", below, of.trials.size()));
+  if (&of == &learned)
+    left_out("pushes that are not above 5 error bars",
+             std::ranges::count(of.trials, false, &PushTrial::is_above));
 }
 
 }  // namespace
