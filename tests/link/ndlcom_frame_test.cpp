@@ -269,29 +269,6 @@ TEST(NdlcomDecoder, NeverAcceptsOneWrongBit) {
   }
 }
 
-TEST(NdlcomDecoder, NeverAcceptsTwoOrThreeWrongBitsOrABurst) {
-  Random random(5);
-  for (int n = 0; n < 200000; ++n) {
-    StoredFrame frame{1, 2, static_cast<std::uint8_t>(n), LinkBytes(24)};
-    for (std::uint8_t& byte : frame.payload) byte = static_cast<std::uint8_t>(random.bits());
-    const LinkBytes good = test::encoded(frame);
-    const std::size_t bits = 8 * good.size();
-    std::vector<std::size_t> wrong;
-    if (n % 3 == 2) {  // a burst of up to 16 bits
-      const std::size_t first = random.below(bits - 15);
-      wrong.push_back(first);
-      for (std::size_t k = 1; k < 16; ++k)
-        if (random.uniform() < 0.5) wrong.push_back(first + k);
-    } else {
-      while (wrong.size() < 2U + static_cast<std::size_t>(n % 3)) {
-        const std::size_t bit = random.below(bits);
-        if (std::ranges::find(wrong, bit) == wrong.end()) wrong.push_back(bit);
-      }
-    }
-    ASSERT_EQ(accepted_with(good, wrong), 0) << "seed 5, case " << n;
-  }
-}
-
 TEST(NdlcomDecoder, WithstandsRandomBytes) {
   Random random(6);
   for (const NdlcomRules rules : {NdlcomRules::strict, NdlcomRules::lenient}) {
