@@ -70,7 +70,7 @@ LinkBytes random_frame(Random& random, LinkBytes& payload) {
   return frame;
 }
 
-/// Of `cases` damaged frames, those in which a decoder with these rules finds a frame that was not sent.
+/// Counts in `cases` damaged frames those in which a decoder with these rules finds a frame that was not sent.
 std::size_t accepted_wrong_frames(const Damage& damage, NdlcomRules rules, std::uint64_t seed,
                                   std::size_t cases) {
   Random random(seed);
