@@ -162,7 +162,7 @@ void refuse_motion_without_return(const TrainingData& data) {
        .found = fmt::format("{} samples, of which the last third is beyond all others",
                             data.usable_samples()),
        .advice = "Load and unload several times: otherwise nothing shows the error of a model with "
-                 "memory. Or fit one without memory, such as polynomial."});
+                 "memory. Or fit one without memory, such as polynomial:branch=false."});
 }
 
 std::vector<std::string> unused_recordings(const TrainingData& data) {

@@ -267,7 +267,8 @@ std::vector<double> start_of(const Candidate& made, RigidDrive::Parameters guess
   return start;
 }
 
-/// RMSE of free runs through blocks that the fit did not see; infinite where a fit failed.
+/// RMSE of free runs through blocks that the fit did not see; infinite where a fit failed and where there is but
+/// one block.
 double held_out(const Candidate& made, const TrainingData& blocks, const Progress& progress) {
   constexpr std::size_t kFolds = 4;
   // Blocks are short, and the basic fit is a good start: one search each, not to the last digit.
@@ -275,14 +276,16 @@ double held_out(const Candidate& made, const TrainingData& blocks, const Progres
                                     .tolerance = 1e-4,
                                     .start_samples = kStartSamples,
                                     .progress = progress};
+  const std::size_t folds = std::min(kFolds, blocks.sequences.size());
+  if (folds < 2) return HUGE_VAL;
   double sum = 0.0;
-  for (std::size_t fold = 0; fold < kFolds; ++fold) {
+  for (std::size_t fold = 0; fold < folds; ++fold) {
     TrainingData seen = blocks;
     TrainingData unseen = blocks;
     seen.sequences.clear();
     unseen.sequences.clear();
     for (std::size_t i = 0; i < blocks.sequences.size(); ++i)
-      (i % kFolds == fold ? unseen : seen).sequences.push_back(blocks.sequences[i]);
+      (i % folds == fold ? unseen : seen).sequences.push_back(blocks.sequences[i]);
     try {
       const SimulationFit fit =
           fit_by_simulation(made.model, seen, {start_of(made, made.with)}, search);
@@ -294,7 +297,7 @@ double held_out(const Candidate& made, const TrainingData& blocks, const Progres
       return HUGE_VAL;
     }
   }
-  return std::sqrt(sum / kFolds);
+  return std::sqrt(sum / static_cast<double>(folds));
 }
 
 struct Choice {

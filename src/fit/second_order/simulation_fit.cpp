@@ -378,16 +378,19 @@ std::vector<SearchedParameter> further_gains(const TrainingData& data) {
 }
 
 TrainingData in_blocks(const TrainingData& data, std::size_t blocks) {
-  std::size_t samples = 0;
-  for (const Sequence& sequence : data.sequences) samples += sequence.target.size();
-  const std::size_t length = std::max<std::size_t>(samples / blocks, 1);
+  const std::size_t length = std::max<std::size_t>(data.usable_samples() / blocks, 1);
   TrainingData cut = data;
   cut.sequences.clear();
   for (const Sequence& whole : data.sequences) {
-    const std::size_t parts = std::max<std::size_t>((whole.target.size() + length / 2) / length, 1);
-    for (std::size_t i = 0; i < parts; ++i) {
-      const std::size_t begin = whole.target.size() * i / parts;
-      const std::size_t end = whole.target.size() * (i + 1) / parts;
+    std::vector<std::size_t> usable;
+    for (std::size_t n = 0; n < whole.use.size(); ++n)
+      if (whole.use[n] != 0) usable.push_back(n);
+    if (usable.empty()) continue;
+    const std::size_t parts = std::max<std::size_t>((usable.size() + length / 2) / length, 1);
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i <= parts; ++i) {
+      // A block ends where the next one has its first usable sample, the last one after its own last.
+      const std::size_t end = i < parts ? usable[usable.size() * i / parts] : usable.back() + 1;
       const auto first = static_cast<std::ptrdiff_t>(begin);
       const auto last = static_cast<std::ptrdiff_t>(end);
       Sequence& part = cut.sequences.emplace_back(Sequence{
@@ -396,6 +399,7 @@ TrainingData in_blocks(const TrainingData& data, std::size_t blocks) {
         std::ranges::copy(whole.features.row(n), part.features.row(n - begin).begin());
       part.target.assign(whole.target.begin() + first, whole.target.begin() + last);
       part.use.assign(whole.use.begin() + first, whole.use.begin() + last);
+      begin = end;
     }
   }
   return cut;

@@ -123,7 +123,7 @@ void require_excitation(const TrainingData& data);
 /// Gains of the inputs after the first, to be searched for, from 0 on.
 [[nodiscard]] std::vector<SearchedParameter> further_gains(const TrainingData& data);
 
-/// The sequences cut into about `blocks` contiguous parts, each a sequence of its own.
+/// The sequences cut into about `blocks` contiguous parts of as many usable samples, each a sequence of its own.
 [[nodiscard]] TrainingData in_blocks(const TrainingData& data, std::size_t blocks);
 
 /// The range of the target, widened by five times its width to each side and to 0.

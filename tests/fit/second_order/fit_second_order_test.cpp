@@ -9,6 +9,7 @@
 #include "evaluate/initial_state.hpp"
 #include "fit/second_order/fit_dynamic_bouc_wen.hpp"
 #include "fit/second_order/fit_rigid_drive.hpp"
+#include "fit/second_order/simulation_fit.hpp"
 #include "support/driven_record.hpp"
 #include "support/error_message.hpp"
 #include "torsio/evaluate/comparison.hpp"
@@ -110,6 +111,37 @@ TEST(FitRigidDrive, ChoosesATermThatIsThere) {
   const auto with = fit_rigid_drive(carriage_record(300.0, 2400), {.terms = "auto"});
   EXPECT_GT(with.parameters.viscous_quadratic, 200.0);
   EXPECT_THAT(with.notes, Contains(HasSubstr("chosen terms: quadratic")));
+}
+
+/// The data of a fit for which the last third is held out.
+TrainingData without_last_third(TrainingData data) {
+  Sequence& sequence = data.sequences[0];
+  for (std::size_t n = 2 * sequence.use.size() / 3; n < sequence.use.size(); ++n)
+    sequence.use[n] = 0;
+  return data;
+}
+
+TEST(FitRigidDrive, ChoosesATermWhereALastThirdIsNotUsed) {
+  const auto with =
+      fit_rigid_drive(without_last_third(carriage_record(300.0, 3600)), {.terms = "auto"});
+  EXPECT_GT(with.parameters.viscous_quadratic, 200.0);
+  EXPECT_THAT(with.notes, Contains(HasSubstr("chosen terms: quadratic")));
+}
+
+TEST(FitRigidDrive, CutsTheUsableSamplesIntoEqualBlocks) {
+  const TrainingData data = without_last_third(carriage_record(0.0, 3000));
+  const TrainingData blocks = in_blocks(data, 4);
+  ASSERT_EQ(blocks.sequences.size(), 4U);
+  std::size_t begin = 0;
+  for (const Sequence& block : blocks.sequences) {
+    EXPECT_EQ(std::ranges::count(block.use, 1), 500);
+    EXPECT_EQ(block.target.front(), data.sequences[0].target[begin]);
+    begin += block.target.size();
+  }
+  EXPECT_EQ(begin, 2000U);
+  TrainingData none = data;
+  std::ranges::fill(none.sequences[0].use, 0);
+  EXPECT_TRUE(in_blocks(none, 4).sequences.empty());
 }
 
 TEST(FitRigidDrive, FindsFrictionUnderLoadAndHeating) {
