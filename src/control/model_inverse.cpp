@@ -82,7 +82,7 @@ void ModelInverse::reset() noexcept {
 }
 
 void ModelInverse::store(Features features) noexcept {
-  if (!std::isfinite(model_.step(features).value)) model_.reset();
+  if (!model_.advance(features)) model_.reset();
 }
 
 double ModelInverse::on_the_line(double torque_Nm, Features features) const noexcept {

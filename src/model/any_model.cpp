@@ -41,6 +41,7 @@ bool AnyModel::is_rediscretised() const noexcept { return held_->is_rediscretise
 ModelMemory AnyModel::memory(const InputRanges& ranges) const { return held_->memory(ranges); }
 void AnyModel::reset() noexcept { held_->reset(); }
 Estimate AnyModel::step(Features features) noexcept { return held_->step(features); }
+bool AnyModel::advance(Features features) noexcept { return held_->advance(features); }
 bool AnyModel::feeds_back() const noexcept { return held_->feeds_back(); }
 void AnyModel::correct(double measured) noexcept { held_->correct(measured); }
 std::span<const double> AnyModel::state() const noexcept { return held_->state(); }

@@ -71,4 +71,15 @@ TYPED_TEST(ModelLaws, NeverClaimsCertainty) {
   }
 }
 
+TYPED_TEST(ModelLaws, AdvancesItsMemoryAsAStepDoes) {
+  if constexpr (Advances<TypeParam>) {
+    TypeParam stepped = this->model_;
+    for (std::size_t n = 0; n < this->features_.rows; ++n) {
+      EXPECT_TRUE(this->model_.advance(this->features_.row(n)));
+      (void)stepped.step(this->features_.row(n));
+    }
+    EXPECT_EQ(values(this->model_, this->features_), values(stepped, this->features_));
+  }
+}
+
 }  // namespace torsio::test

@@ -43,6 +43,17 @@ TYPED_TEST(AnyModelOfEvery, BehavesAsTheFamilyInIt) {
   }
 }
 
+TYPED_TEST(AnyModelOfEvery, AdvancesItsMemoryAsAStepDoes) {
+  AnyModel advanced = example<TypeParam>();
+  AnyModel stepped = advanced;
+  const Matrix features = test::example_features(300, advanced.input_count());
+  for (std::size_t n = 0; n < features.rows; ++n) {
+    EXPECT_TRUE(advanced.advance(features.row(n)));
+    (void)stepped.step(features.row(n));
+  }
+  EXPECT_EQ(advanced.step(features.row(0)).value, stepped.step(features.row(0)).value);
+}
+
 TEST(AnyModel, IsAValue) {
   AnyModel model = example<MaxwellSlipModel>();
   const Matrix features = test::example_features(100, model.input_count());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -100,6 +101,9 @@ class AnyModel {
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;
+  /// As `step`, for a caller that does not use the output, which some families then do not compute.
+  /// @returns whether the output, or without one the memory, is finite
+  [[nodiscard]] bool advance(Features features) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] bool feeds_back() const noexcept;  ///< its own output, as `FeedsBack` families do
   /// Puts a measurement in the place of the last output; nothing to a model that does not feed back.
@@ -148,6 +152,7 @@ class HeldModel {
   [[nodiscard]] virtual ModelMemory memory(const InputRanges& ranges) const = 0;
   virtual void reset() noexcept = 0;
   virtual Estimate step(Features features) noexcept = 0;
+  virtual bool advance(Features features) noexcept = 0;
   [[nodiscard]] virtual bool feeds_back() const noexcept = 0;
   virtual void correct(double measured) noexcept = 0;
   [[nodiscard]] virtual std::span<const double> state() const noexcept = 0;
@@ -214,6 +219,12 @@ class HeldModelOf final : public HeldModel {
   }
   void reset() noexcept override { model_.reset(); }
   Estimate step(Features features) noexcept override { return model_.step(features); }
+  bool advance(Features features) noexcept override {
+    if constexpr (Advances<M>)
+      return model_.advance(features);
+    else
+      return std::isfinite(model_.step(features).value);
+  }
 
   [[nodiscard]] bool feeds_back() const noexcept override { return FeedsBack<M>; }
   void correct([[maybe_unused]] double measured) noexcept override {

@@ -135,6 +135,7 @@ GreyBox::GreyBox(Parameters parameters)
   require(coefficients_.size() == parameters_.terms.columns(), {GreyBox::kFamily, "coefficients"},
           "one column for each term", std::to_string(coefficients_.size()) + " columns");
   jumped_.resize(terms_.bank_states());
+  banks_follow_x_ = std::ranges::any_of(parameters_.terms.banks, &InputBank::follows_x);
   if (!parameters_.residual) return;
   const GreyBoxResidual& learned = *parameters_.residual;
   std::visit([this]<class P>(const P& own) { residual_.emplace<typename P::Family>(own); },
@@ -215,6 +216,11 @@ Estimate GreyBox::step(Features features) noexcept {
   return {.value = value + residual(features)};
 }
 
+bool GreyBox::advance(Features features) noexcept {
+  terms_.move(features);
+  return all_finite(terms_.state());
+}
+
 double GreyBox::residual(Features features) noexcept {
   if (!parameters_.residual) return 0.0;
   const GreyBoxResidual& learned = *parameters_.residual;
@@ -238,70 +244,86 @@ double GreyBox::residual(Features features) noexcept {
   return share * std::min(std::max(correction, -learned.bound), learned.bound);
 }
 
-double GreyBox::at_jump(const ScheduledCoefficients::Position& at, double x,
-                        Features features) const noexcept {
-  double value = 0.0;
-  const auto add = [&](std::size_t column, double term) {
-    value += coefficients_.coefficient(at, column) * term;
-  };
-  terms_.visit_jump(x, add);
-  terms_.visit_banks(x, features, jumped_, add);
-  return value;
-}
-
-double GreyBox::others(const ScheduledCoefficients::Position& at,
-                       Features features) const noexcept {
+template <class Coefficient>
+double GreyBox::others(const Coefficient& coefficient, Features features) const noexcept {
   const GreyBoxTerms::Structure& structure = parameters_.terms;
   double value = 0.0;
   for (std::size_t j = 1; j < features.size(); ++j) {
-    value += coefficients_.coefficient(at, structure.first_slope() + j) * features[j];
+    value += coefficient(structure.first_slope() + j) * features[j];
     if (const double scale = structure.rate_scales[j]; scale > 0.0)
-      value += coefficients_.coefficient(at, structure.first_coulomb() + j) *
+      value += coefficient(structure.first_coulomb() + j) *
                detail::hyperbolic_tangent(features[j] / scale);
   }
   return value;
 }
 
-/// From where the box is along the curve's mean slope, then by secants: most targets of a loop are a few
-/// knots away, and between knots the box is all but straight. NaN where that does not end soon.
+/// Newton's steps from where the box is: most targets of a loop are a few knots away, and between knots and
+/// limits of slips the box is linear. A step out of the bracket becomes a secant of the bracket; NaN where that
+/// does not end soon. @param rise of the curve
 template <class Error>
-double GreyBox::near_root(const Error& error_at, const ScheduledCoefficients::Position& at,
-                          double wanted) const noexcept {
+double GreyBox::near_root(const Error& error_at, double rise, double wanted) const noexcept {
   constexpr int kSteps = 8;
   constexpr double kShare = 1e-13;
+  struct End {
+    double x;
+    double error = std::numeric_limits<double>::quiet_NaN();
+  };
   const std::vector<double>& knots = parameters_.terms.curve_knots;
-  double before = std::min(std::max(terms_.position(), knots.front()), knots.back());
-  double error_before = error_at(before);
-  const double rise =
-      coefficients_.coefficient(at, knots.size() - 1) - coefficients_.coefficient(at, 0);
   const double enough = kShare * (std::abs(rise) + std::abs(wanted));
   if (!std::isfinite(enough)) return std::numeric_limits<double>::quiet_NaN();
-  if (std::abs(error_before) <= enough) return before;
-  double x = before - error_before * (knots.back() - knots.front()) / rise;
-  for (int i = 0; i < kSteps && x >= knots.front() && x <= knots.back(); ++i) {
-    const double error = error_at(x);
-    if (std::abs(error) <= enough) return x;
-    const double next = x - error * (x - before) / (error - error_before);
-    before = x;
-    error_before = error;
-    x = next;
+  End low{.x = knots.front()};
+  End high{.x = knots.back()};
+  double x = std::min(std::max(terms_.position(), low.x), high.x);
+  for (int i = 0; i < kSteps; ++i) {
+    const detail::Sloped error = error_at(x);
+    if (std::abs(error.value) <= enough) return x;
+    (error.value < 0.0 ? low : high) = {.x = x, .error = error.value};
+    x -= error.value / error.slope;
+    if (!(x > low.x && x < high.x))
+      x = (low.x * high.error - high.x * low.error) / (high.error - low.error);
+    if (!(x > low.x && x < high.x)) break;
   }
   return std::numeric_limits<double>::quiet_NaN();
 }
 
 Estimate GreyBox::invert(double target, Features features) noexcept {
   const CoefficientSchedule& schedule = coefficients_.schedule();
-  if (schedule.scheduled && schedule.feature == 0) return detail::no_inverse(features);
+  if (!schedule.scheduled) {
+    const auto row = schedule.values.row(0);
+    return solved([row](std::size_t column) { return row[column]; }, target, features);
+  }
+  if (schedule.feature == 0) return detail::no_inverse(features);
   const auto at = coefficients_.locate(features);
-  const double wanted = target - others(at, features) - residual(features);
+  return solved([&](std::size_t column) { return coefficients_.coefficient(at, column); }, target,
+                features);
+}
+
+template <class Coefficient>
+Estimate GreyBox::solved(const Coefficient& coefficient, double target,
+                         Features features) noexcept {
+  double wanted = target - others(coefficient, features) - residual(features);
   terms_.jump_banks(features, jumped_);
-  const auto error_at = [&](double x) { return at_jump(at, x, features) - wanted; };
+  if (!banks_follow_x_)
+    terms_.visit_banks(0.0, features, jumped_, [&](std::size_t column, double term) {
+      wanted -= coefficient(column) * term;
+    });
+  const auto error_at = [&](double x) {
+    detail::Sloped error{.value = -wanted};
+    const auto add = [&](std::size_t column, const auto& term) {
+      error += coefficient(column) * term;
+    };
+    terms_.visit_jump(x, add);
+    if (banks_follow_x_)
+      terms_.visit_banks(detail::Sloped{.value = x, .slope = 1.0}, features, jumped_, add);
+    return error;
+  };
   double low = parameters_.terms.curve_knots.front();
   double high = parameters_.terms.curve_knots.back();
-  if (const double near = near_root(error_at, at, wanted); near >= low && near <= high)
+  const double rise = coefficient(parameters_.terms.first_slip() - 1) - coefficient(0);
+  if (const double near = near_root(error_at, rise, wanted); near >= low && near <= high)
     return {.value = near};
-  double error_low = error_at(low);
-  double error_high = error_at(high);
+  double error_low = error_at(low).value;
+  double error_high = error_at(high).value;
   if (!(error_low * error_high <= 0.0)) {
     // Beyond its ends the curve continues; the nearer one is left.
     const bool is_low = std::abs(error_low) < std::abs(error_high);
@@ -309,10 +331,10 @@ Estimate GreyBox::invert(double target, Features features) noexcept {
     const double beyond = kInversionReach * (high - low);
     if (is_low) {
       high = std::exchange(low, low - beyond);
-      error_high = std::exchange(error_low, error_at(low));
+      error_high = std::exchange(error_low, error_at(low).value);
     } else {
       low = std::exchange(high, high + beyond);
-      error_low = std::exchange(error_high, error_at(high));
+      error_low = std::exchange(error_high, error_at(high).value);
     }
     if (!(error_low * error_high <= 0.0))
       return {.value = end, .fault = Fault::outside_training_range};
@@ -326,7 +348,7 @@ Estimate GreyBox::invert(double target, Features features) noexcept {
     const double secant = (low * error_high - high * error_low) / (error_high - error_low);
     const bool is_inside = secant > low && secant < high;
     x = is_inside && i % 8 != 7 ? secant : 0.5 * (low + high);
-    const double error = error_at(x);
+    const double error = error_at(x).value;
     if (error == 0.0) break;
     if ((error < 0.0) == (error_low < 0.0)) {
       low = x;

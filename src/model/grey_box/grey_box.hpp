@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -122,7 +121,8 @@ class GreyBoxTerms {
   /// @param features the first is not looked at
   template <class Term>
   void visit(Features features, Term&& term) const noexcept {
-    visit_motion(last_, main_state(), term);
+    visit_motion(
+        last_, [this](std::size_t i) { return state_[i]; }, term);
     visit_banks(last_, features, bank_state(), term);
     for (std::size_t j = 1; j < features.size(); ++j) {
       term(structure_.first_slope() + j, features[j]);
@@ -131,26 +131,29 @@ class GreyBoxTerms {
     }
   }
 
-  /// The terms of x alone, if x had jumped here at once: nothing relaxes on the way.
+  /// The terms of x alone, if x had jumped here at once: nothing relaxes on the way. Each term comes with its
+  /// slope over x.
   template <class Term>
   void visit_jump(double x, Term&& term) const noexcept {
-    std::array<double, kMaxThresholds + kMaxTimeConstants> moved;
-    const double dx = is_started_ ? x - last_ : 0.0;  // the first sample has no increment
-    const std::size_t slips = slips_.size();
-    for (std::size_t i = 0; i < slips; ++i)
-      moved[i] = std::min(std::max(state_[i] + dx * slips_.stiffness()[i], -1.0), 1.0);
-    const std::size_t states = main_state().size();
-    for (std::size_t j = slips; j < states; ++j) moved[j] = state_[j] + dx;
-    visit_motion(x, std::span(moved).first(states), term);
+    using detail::Sloped;
+    // The first sample has no increment.
+    const Sloped dx = is_started_ ? Sloped{.value = x - last_, .slope = 1.0} : Sloped{};
+    const std::span<const double> stiffness = slips_.stiffness();
+    const auto moved = [&](std::size_t i) {
+      if (i >= stiffness.size()) return dx + state_[i];
+      return detail::limited(dx * stiffness[i] + state_[i], -1.0, 1.0);
+    };
+    visit_motion(Sloped{.value = x, .slope = 1.0}, moved, term);
   }
 
   /// States of all banks.
   [[nodiscard]] std::size_t bank_states() const noexcept { return bank_state().size(); }
   /// The states of the banks if their inputs had jumped here at once. @param state `bank_states()`
   void jump_banks(Features features, std::span<double> state) const noexcept TORSIO_REALTIME;
-  /// The terms of the banks alone with these states and this x; `features[0]` is not looked at.
-  template <class Term>
-  void visit_banks(double x, Features features, std::span<const double> state,
+  /// The terms of the banks alone with these states and this x, a number or a `Sloped`; `features[0]` is not
+  /// looked at.
+  template <class Number, class Term>
+  void visit_banks(Number x, Features features, std::span<const double> state,
                    Term&& term) const noexcept {
     std::size_t column = structure_.first_bank();
     for (const InputBank& bank : structure_.banks) {
@@ -161,27 +164,31 @@ class GreyBoxTerms {
   }
 
  private:
-  [[nodiscard]] std::span<const double> main_state() const noexcept {
-    return std::span(state_).first(slips_.size() + decay_.size());
-  }
   [[nodiscard]] std::span<const double> bank_state() const noexcept {
     return std::span(state_).subspan(slips_.size() + decay_.size());
   }
 
-  template <class Term>
-  void visit_motion(double x, std::span<const double> state, Term&& term) const noexcept {
-    const detail::HatCell curve = detail::hat_cell(structure_.curve_knots, x);
+  /// @param state of s_i / r_i, then of v_j, as a function of the index
+  template <class Number, class State, class Term>
+  void visit_motion(Number x, const State& state, Term&& term) const noexcept {
+    const auto curve = detail::hat_cell(structure_.curve_knots, x);
     term(curve.left, 1.0 - curve.share);
     term(curve.left + 1, curve.share);
+    const std::size_t slips = slips_.size();
     const std::size_t knots = structure_.friction_knots.size();
-    const detail::HatCell slip = detail::held_hat_cell(structure_.friction_knots, x);
-    std::size_t column = structure_.first_slip() + slip.left;
-    for (std::size_t i = 0; i < slips_.size(); ++i, column += knots) {
-      term(column, (1.0 - slip.share) * state[i]);
-      if (knots > 1) term(column + 1, slip.share * state[i]);
+    std::size_t column = structure_.first_slip();
+    if (knots == 1) {
+      for (std::size_t i = 0; i < slips; ++i) term(column + i, state(i));
+    } else {
+      const auto slip = detail::held_hat_cell(structure_.friction_knots, x);
+      column += slip.left;
+      for (std::size_t i = 0; i < slips; ++i, column += knots) {
+        term(column, (1.0 - slip.share) * state(i));
+        term(column + 1, slip.share * state(i));
+      }
     }
-    for (std::size_t j = slips_.size(); j < state.size(); ++j)
-      term(structure_.first_relaxation() + j - slips_.size(), state[j]);
+    for (std::size_t j = 0; j < decay_.size(); ++j)
+      term(structure_.first_relaxation() + j, state(slips + j));
   }
 
   Structure structure_;
@@ -267,6 +274,8 @@ class GreyBox {
 
   void reset() noexcept { terms_.reset(); }
   Estimate step(Features features) noexcept TORSIO_REALTIME;
+  /// The memory after a `step`, without its output. @returns whether the memory is finite
+  bool advance(Features features) noexcept TORSIO_REALTIME;
 
   /// As of the last `step`.
   [[nodiscard]] const GreyBoxTerms& terms() const noexcept { return terms_; }
@@ -281,8 +290,8 @@ class GreyBox {
   void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(terms_); }
 
   /// The first input at which the output would be `target` after an immediate change from the
-  /// present input, the others as given and the residual as at the present input (secants kept
-  /// inside a bracket, at most `kInversionSteps`). Where neither the curve nor its continuation beyond
+  /// present input, the others as given and the residual as at the present input (Newton's steps, then
+  /// secants kept inside a bracket, at most `kInversionSteps`). Where neither the curve nor its continuation beyond
   /// the nearer end, `kInversionReach` times as long, encloses the target, that end is returned with
   /// `Fault::outside_training_range`; where the schedule uses the first input, `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
@@ -290,13 +299,13 @@ class GreyBox {
   static constexpr double kInversionReach = 1.5;  ///< further than an estimator uses the value
 
  private:
-  [[nodiscard]] double at_jump(const ScheduledCoefficients::Position& at, double x,
-                               Features features) const noexcept;
+  template <class Coefficient>
+  [[nodiscard]] Estimate solved(const Coefficient& coefficient, double target,
+                                Features features) noexcept;
   template <class Error>
-  [[nodiscard]] double near_root(const Error& error_at, const ScheduledCoefficients::Position& at,
-                                 double wanted) const noexcept;
-  [[nodiscard]] double others(const ScheduledCoefficients::Position& at,
-                              Features features) const noexcept;
+  [[nodiscard]] double near_root(const Error& error_at, double rise, double wanted) const noexcept;
+  template <class Coefficient>
+  [[nodiscard]] double others(const Coefficient& coefficient, Features features) const noexcept;
   [[nodiscard]] double residual(Features features) noexcept;
 
   Parameters parameters_;
@@ -305,6 +314,7 @@ class GreyBox {
   std::variant<std::monostate, Mlp, Dgmm> residual_;  ///< the first: none
   std::vector<double> residual_inputs_;
   std::vector<double> jumped_;  ///< states of the banks, while inverting
+  bool banks_follow_x_ = false;
 };
 
 }  // namespace torsio

@@ -77,6 +77,12 @@ struct InputBank {
     return thresholds.size() + time_constants_s.size();
   }
 
+  /// Whether a term depends on the first input.
+  [[nodiscard]] bool follows_x() const noexcept {
+    return (!thresholds.empty() && force_knots.size() > 1) ||
+           (!product_knots.empty() && product_input == 0);
+  }
+
   /// @param inputs of the model @param place "grey_box: banks/0", for the message
   /// @throws Error naming the field that makes no sense.
   void check(std::size_t inputs, const std::string& place) const;
@@ -116,15 +122,15 @@ class InputBankTerms {
   /// Calls term(column, value) for each term that is not 0 for sure.
   /// @param bank the one of the constructor
   /// @param first column of the bank
-  /// @param x the first input; that of `features` is not looked at
-  template <class Term>
-  static void visit(const InputBank& bank, std::size_t first, double x, Features features,
+  /// @param x the first input, a number or a `Sloped`; that of `features` is not looked at
+  template <class Number, class Term>
+  static void visit(const InputBank& bank, std::size_t first, Number x, Features features,
                     std::span<const double> state, Term&& term) noexcept {
     const double u = features[bank.input];
     const std::size_t slips = bank.thresholds.size();
     if (slips > 0) {
       const std::size_t knots = bank.force_knots.size();
-      const detail::HatCell cell = detail::held_hat_cell(bank.force_knots, x);
+      const auto cell = detail::held_hat_cell(bank.force_knots, x);
       std::size_t column = first + cell.left;
       for (std::size_t i = 0; i < slips; ++i, column += knots) {
         term(column, (1.0 - cell.share) * state[i]);
@@ -133,15 +139,20 @@ class InputBankTerms {
     }
     if (const auto& knots = bank.curve_knots;
         !knots.empty() && u >= knots.front() && u <= knots.back()) {
-      const detail::HatCell cell = detail::hat_cell(knots, u);
+      const auto cell = detail::hat_cell(knots, u);
       if (cell.left > 0) term(first + bank.first_curve() + cell.left - 1, 1.0 - cell.share);
       if (cell.left + 2 < knots.size()) term(first + bank.first_curve() + cell.left, cell.share);
     }
     if (!bank.product_knots.empty()) {
-      const double s = bank.product_input == 0 ? x : features[bank.product_input];
-      const detail::HatCell cell = detail::held_hat_cell(bank.product_knots, s);
-      term(first + bank.first_product() + cell.left, (1.0 - cell.share) * u);
-      term(first + bank.first_product() + cell.left + 1, cell.share * u);
+      const auto visit_product = [&](auto s) {
+        const auto cell = detail::held_hat_cell(bank.product_knots, s);
+        term(first + bank.first_product() + cell.left, (1.0 - cell.share) * u);
+        term(first + bank.first_product() + cell.left + 1, cell.share * u);
+      };
+      if (bank.product_input == 0)
+        visit_product(x);
+      else
+        visit_product(features[bank.product_input]);
     }
     for (std::size_t j = slips; j < state.size(); ++j)
       term(first + bank.first_relaxation() + j - slips, state[j]);

@@ -169,6 +169,46 @@ TEST(GreyBox, InvertsFromWhereItIsWithinItsCurve) {
   }
 }
 
+TEST(GreyBox, InvertsFrictionUnderLoadBanksAndAScheduleToTheLastDigits) {
+  GreyBox::Parameters parameters;
+  parameters.terms = {.curve_knots = {-1.0, -0.2, 0.3, 1.0},
+                      .thresholds = {0.02, 0.2},
+                      .friction_knots = {-1.0, 0.0, 1.0},
+                      .time_constants_s = {},
+                      .rate_scales = {0.0, 0.05},
+                      .sample_period_s = 0.001,
+                      .banks = {{.input = 1,
+                                 .thresholds = {0.05},
+                                 .force_knots = {-0.5, 0.5},
+                                 .product_knots = {-0.5, 0.5},
+                                 .product_input = 0}}};
+  const std::vector<double> row = {-9.0, -1.0, 3.0, 15.0, 0.5, 0.3, 0.8, 1.0, 0.6,
+                                   1.4,  0.0,  0.7, 0.0,  0.4, 0.3, 0.9, 0.2, 0.5};
+  Matrix values(2, row.size());
+  for (std::size_t j = 0; j < row.size(); ++j) {
+    values(0, j) = row[j];
+    values(1, j) = 1.2 * row[j];
+  }
+  for (const bool scheduled : {false, true}) {
+    parameters.coefficients = {
+        .scheduled = scheduled, .feature = 1, .knots = {-0.3, 0.3}, .values = values};
+    if (!scheduled) {
+      parameters.coefficients.knots.clear();
+      parameters.coefficients.values = Matrix(1, row.size());
+      parameters.coefficients.values.values = row;
+    }
+    GreyBox box(parameters);
+    Random random(7);
+    for (int n = 0; n < 1000; ++n) {
+      const double u = 0.4 * std::sin(0.11 * n);
+      const double target = -7.0 + 20.0 * random.uniform();
+      const Estimate found = box.invert(target, std::array{0.0, u});
+      ASSERT_EQ(found.fault, Fault::none) << n;
+      EXPECT_NEAR(box.step(std::array{found.value, u}).value, target, 1e-10) << n;
+    }
+  }
+}
+
 TEST(GreyBox, InvertsTheContinuationOfItsCurveAndReportsATargetBeyondIt) {
   GreyBox::Parameters parameters = plain();
   parameters.coefficients.values.values = {-10.0, 0.0, 20.0, 0.0, 0.0};

@@ -52,6 +52,13 @@ concept FeedsBack = Model<M> && requires(M model, double measured) {
   { model.correct(measured) } noexcept;
 };
 
+/// A model whose memory can be moved without computing the output: after `advance` it is as after `step`.
+/// Returns whether the memory is finite.
+template <class M>
+concept Advances = requires(M& model, Features features) {
+  { model.advance(features) } noexcept -> std::same_as<bool>;
+};
+
 /// A model that can be inverted: from the target to its first input, whose value in `features` is at
 /// most where a search starts. `invert` returns a finite value in every case; it may need scratch
 /// space, so it is not const.
