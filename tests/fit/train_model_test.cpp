@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <utility>
@@ -9,6 +11,7 @@
 
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/common/inputs.hpp"
 
 namespace torsio {
@@ -47,6 +50,62 @@ TEST(TrainModel, RefusesAnInverseWhoseTargetIsOffByUnknownZeros) {
   };
   EXPECT_NE(refusal({"torque_Nm"}).find("a zero: rule for gear_angle_rad"), std::string::npos);
   EXPECT_EQ(refusal({"lowpass(joint_angle_rad, 10Hz)"}), "") << "no inverse";
+}
+
+/// A ramp with small reversals: its last third is beyond the other two.
+Dataset dataset_that_never_returns() {
+  std::vector<double> deflection_rad;
+  std::vector<double> torque_Nm;
+  for (int n = 0; n < 1500; ++n) {
+    deflection_rad.push_back(1e-4 * n + 1e-3 * std::sin(0.2 * n));
+    torque_Nm.push_back(200.0 * deflection_rad.back() + 0.3 * std::cos(0.2 * n));
+  }
+  Recording recording("ramp", 100.0);
+  recording.add({.name = "spring_deflection_rad", .values = std::move(deflection_rad)});
+  recording.add({.name = "torque_Nm", .values = std::move(torque_Nm)});
+  Dataset dataset;
+  const std::size_t samples = recording.size();
+  dataset.records.push_back(
+      {.recording = std::move(recording), .segments = {{0, samples, Role::train}}});
+  return dataset;
+}
+
+TEST(TrainModel, AMotionThatNeverReturnsIsRefusedWithAModelThatCanBeTrained) {
+  const Dataset dataset = dataset_that_never_returns();
+  const auto refusal = [&](const char* model) {
+    const auto choices = model_choices(dataset, model, {"spring_deflection_rad"});
+    return test::error_message([&] { (void)train_model(dataset, choices.front(), 1); });
+  };
+  const std::string message = refusal("maxwell_slip");
+  EXPECT_NE(message.find("comes back to where it was"), std::string::npos) << message;
+  constexpr const char* kAdvised = "polynomial:branch=false";
+  EXPECT_NE(message.find(kAdvised), std::string::npos) << message;
+  EXPECT_EQ(refusal(kAdvised), "");
+}
+
+/// A joint that is driven at ten speeds, each for two seconds.
+TEST(TrainModel, ConstantSpeedsDetermineFriction) {
+  std::vector<double> speed_rad_s;
+  std::vector<double> torque_Nm;
+  for (const double speed : {0.2, 0.4, 0.8, 1.2, 2.0, -0.2, -0.4, -0.8, -1.2, -2.0})
+    for (int n = 0; n < 100; ++n) {
+      speed_rad_s.push_back(speed + 0.002 * std::sin(1.7 * n));
+      torque_Nm.push_back(0.52 * speed + std::copysign(0.57, speed) + 0.02 * std::sin(2.9 * n));
+    }
+  Recording recording("speeds", 50.0);
+  recording.add({.name = "joint_speed_rad_s", .values = std::move(speed_rad_s)});
+  recording.add({.name = "torque_Nm", .values = std::move(torque_Nm)});
+  Dataset dataset;
+  dataset.records.push_back({.recording = recording, .segments = {{0, 1000, Role::train}}});
+  const auto row_of = [&](const char* model, const char* name) {
+    const auto choices = model_choices(dataset, model, {"joint_speed_rad_s"});
+    const TrainedModel trained = train_model(dataset, choices.front(), 1);
+    const auto row = std::ranges::find_if(
+        trained.table, [&](const auto& each) { return each.name.starts_with(name); });
+    return row == trained.table.end() ? kNotMeasured : row->value;
+  };
+  EXPECT_NEAR(row_of("linear_coulomb:rates=true", "c ("), 0.57, 0.02);
+  EXPECT_NEAR(row_of("linear_coulomb:rates=true", "k1 ("), 0.52, 0.02);
 }
 
 }  // namespace
