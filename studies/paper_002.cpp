@@ -22,8 +22,8 @@ namespace {
 
 constexpr const char* kActuator = "rubber-clutch";
 constexpr double kFullScale_Nm = 0.5;  // where the clutch slips
-constexpr const char* kTwist = "input_angle_rad - joint_angle_rad";
-constexpr const char* kTwistRate = "lowpass(rate(input_angle_rad - joint_angle_rad), 10Hz)";
+constexpr const char* kSensorTwist = "input_angle_rad - joint_angle_rad";
+constexpr const char* kSensorTwistRate = "lowpass(rate(input_angle_rad - joint_angle_rad), 10Hz)";
 constexpr const char* kMultisine = "multisine";
 /// A network with memory is not valid before; the other models are not scored there either.
 constexpr std::size_t kWarmUp = 200;
@@ -149,8 +149,8 @@ void compare_into(StudyRows& rows, const SensorBench& bench,
   std::vector<ModelChoice> choices;
   std::vector<std::pair<std::string, std::string>> models;  // name of each choice
   for (const SensorCandidate& candidate : candidates) {
-    std::vector<std::string> inputs{kTwist};
-    if (candidate.has_rate) inputs.emplace_back(kTwistRate);
+    std::vector<std::string> inputs{kSensorTwist};
+    if (candidate.has_rate) inputs.emplace_back(kSensorTwistRate);
     choices.push_back(model_choices(bench.dataset, candidate.model, inputs).front());
     models.emplace_back(choices.back().family, choices.back().variant());
   }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "report/json_text.hpp"
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

@@ -1,8 +1,17 @@
 #pragma once
 
+#include <span>
+#include <string_view>
+
 #include "studies/study.hpp"
 
 namespace torsio {
+
+/// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets
+/// (specification 5).
+[[nodiscard]] std::span<const StudyInfo> studies() noexcept;
+/// @throws UsageError that lists them.
+[[nodiscard]] const StudyInfo& find_study(std::string_view name);
 
 // One function a study, in the file of its paper.
 

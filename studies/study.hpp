@@ -180,12 +180,6 @@ struct StudyInfo {
   bool has_figures = false;    ///< `Study::figures` are set
 };
 
-/// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets
-/// (specification 5).
-[[nodiscard]] std::span<const StudyInfo> studies() noexcept;
-/// @throws UsageError that lists them.
-[[nodiscard]] const StudyInfo& find_study(std::string_view name);
-
 /// Deterministic for the options. @throws UsageError unless there are 1 to 100 repeats; Cancelled;
 /// Error if a model cannot be fitted.
 [[nodiscard]] Study run_study(const StudyInfo& study, const StudyOptions& options,

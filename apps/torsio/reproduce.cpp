@@ -15,7 +15,7 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "studies/paper_items.hpp"
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 #include "studies/study_cache.hpp"
 #include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"

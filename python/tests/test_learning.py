@@ -151,7 +151,7 @@ def test_families_lists_options():
 
 
 def test_plots(model, other_sweep):
-    import matplotlib
+    matplotlib = pytest.importorskip("matplotlib")
 
     matplotlib.use("Agg")
     assert torsio.plot.loop(other_sweep, model).get_xlabel() == "spring deflection [rad]"

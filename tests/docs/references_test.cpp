@@ -443,7 +443,7 @@ TEST(Documents, AStudyThatDoesNotExistIsFound) {
 }
 
 TEST(Documents, ReproduceOnlyStudiesThatExist) {
-  const Names studies = studies_of(file_bytes(kRoot / "studies/study.cpp"));
+  const Names studies = studies_of(file_bytes(kRoot / "studies/studies.cpp"));
   EXPECT_GT(studies.size(), 15U);
   for_each_document([&](const fs::path&, const std::string& text) {
     EXPECT_THAT(unknown_studies(text, studies), IsEmpty());

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "real_data/real_data.hpp"
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/evaluate/comparison.hpp"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "studies/arm_trajectory.hpp"
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 
 namespace torsio {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 #include "studies/study_report.hpp"
 
 // docs/results holds the output of commands: what it prints as a figure of a paper must be the

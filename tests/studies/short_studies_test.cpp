@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <variant>
 
-#include "studies/study.hpp"
+#include "studies/studies.hpp"
 
 namespace torsio {
 namespace {

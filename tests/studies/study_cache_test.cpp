@@ -12,6 +12,7 @@
 #include <string>
 #include <variant>
 
+#include "studies/studies.hpp"
 #include "support/error_message.hpp"
 #include "support/file_bytes.hpp"
 #include "support/temporary_folder.hpp"

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "fit/common/usable_table.hpp"
+#include "studies/studies.hpp"
 #include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/sim/experiments/experiment.hpp"

@@ -4,7 +4,10 @@ import unittest
 from repository import RepositoryTest
 
 TREE = {
-    "studies/paper_001.cpp": '#include "torsio/fit/line.hpp"\n#include "paper_figures.inc"\nint study();  // a comment\n',
+    "studies/paper_001.cpp": '#include "studies.hpp"\n#include "torsio/fit/line.hpp"\n#include "paper_figures.inc"\n'
+                             'int study();  // a comment\n',
+    "studies/studies.hpp": "int study();\n",
+    "studies/studies.cpp": '#include "studies.hpp"\nint count() { return 1; }\n',
     "studies/paper_003.cpp": "int other();\n",
     "include/torsio/fit/line.hpp": '#include "torsio/core/sum.hpp"\nint line();\n',
     "include/torsio/core/sum.hpp": "int sum();\n",
@@ -42,6 +45,8 @@ class Results(RepositoryTest):
         for name, text in (("studies/paper_001.cpp", TREE["studies/paper_001.cpp"].replace("a comment", "another")),
                            ("src/core/sum.cpp", TREE["src/core/sum.cpp"].replace(" { ", "\n{\n  ")),
                            ("src/core/other.cpp", "int other() { return 4; }\n"), ("studies/paper_003.cpp", "int more();\n"),
+                           ("studies/studies.hpp", "int study();\nint another();\n"),
+                           ("studies/studies.cpp", '#include "studies.hpp"\nint count() { return 2; }\n'),
                            ("studies/paper_items.csv", "paper,item\n")):
             self.write(**{name: text})
             self.assertIn("0 of 1", self.results("--stale", "001"), name)
