@@ -27,8 +27,8 @@ using testing::HasSubstr;
 /// A joint on a socket of the file system, and a host that is connected to it.
 class JointConnections : public testing::Test {
  protected:
-  JointConnection connection(int tries = 5) {
-    JointConnection made(JointLine{.unix_path = path_}, {.timeout_s = 0.2, .tries = tries});
+  JointConnection connection(int tries = 5, double timeout_s = 0.2) {
+    JointConnection made(JointLine{.unix_path = path_}, {.timeout_s = timeout_s, .tries = tries});
     return made;
   }
   TemporaryFolder folder_;
@@ -100,7 +100,8 @@ TEST_F(JointConnections, ReferencesMoveTheJointUntilTheHostIsDestroyed) {
 
 TEST_F(JointConnections, RepliesThatAreLostAreRequestedAgain) {
   joint_.lost_share = 0.3;
-  JointConnection host = connection(30);
+  // Many tries within the second of the watchdog, which stops an enabled joint in between.
+  JointConnection host = connection(60, 0.02);
   for (int n = 0; n < 5; ++n) {
     host.write("gain", 1.0 + n);
     EXPECT_EQ(std::get<double>(host.read("gain")), 1.0 + n);
