@@ -80,7 +80,6 @@ using AllFamilies = FamilyList<Linear,                        //
                                Narx<MultivariatePolynomial>,  //
                                Narx<Dgmm>,                    //
                                Narx<Mlp>,                     //
-                               Narx<Lstm>,                    //
                                Narx<GaussianProcess>,         //
                                Narx<ParametricGp>>;
 

@@ -36,7 +36,6 @@ const std::map<std::string_view, Settings> kQuick{
     {"dgmm_paper", {{"components", "50"}}},
     {"gaussian_process", {{"samples", "40"}, {"restarts", "0"}, {"iterations", "10"}}},
     {"parametric_gp", {{"updates", "300"}, {"inducing_points", "6"}}},
-    {"parametric_gp_paper", {{"updates", "300"}, {"inducing_points", "6"}}},
     {"parametric_gp_variational",
      {{"inducing_points", "6"}, {"samples", "80"}, {"iterations", "5"}}},
     {"mlp", {{"layers", "4"}, {"epochs", "2"}, {"batch", "64"}}},
@@ -54,10 +53,8 @@ const std::map<std::string_view, Settings> kQuick{
     {"narx_polynomial", {{"terms", "6"}}},
     {"narx_dgmm", {{"rounds", "1"}}},
     {"narx_mlp", {{"rounds", "1"}}},
-    {"narx_lstm", {{"rounds", "1"}}},
     {"narx_gaussian_process", {{"rounds", "1"}}},
     {"narx_parametric_gp", {{"rounds", "1"}}},
-    {"narx_parametric_gp_paper", {{"rounds", "1"}}},
     {"narx_parametric_gp_variational", {{"rounds", "1"}}},
 };
 
@@ -89,7 +86,6 @@ const std::map<std::string_view, Trial> kTrials{
     {"patience", {.value = "1", .given = {{"epochs", "40"}, {"learning_rate", "0.3"}}}},
     {"members", {.value = "2"}},
     {"narx_mlp.members", {.value = "2", .is_refused = true}},
-    {"narx_lstm.members", {.value = "2", .is_refused = true}},
     {"structure", {.value = "search", .given = {{"input_degree", "auto"}}}},
     {"hammerstein_wiener.zeros", {.value = "1"}},
     {"hammerstein_wiener.poles", {.value = "2"}},
