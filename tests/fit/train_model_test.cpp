@@ -52,6 +52,18 @@ TEST(TrainModel, RefusesAnInverseWhoseTargetIsOffByUnknownZeros) {
   EXPECT_EQ(refusal({"lowpass(joint_angle_rad, 10Hz)"}), "") << "no inverse";
 }
 
+/// One recording of an input and the torque, all of it for training.
+Dataset dataset_of(const std::string& input, double rate_Hz, std::vector<double> values,
+                   std::vector<double> torque_Nm) {
+  Recording recording("own", rate_Hz);
+  recording.add({.name = input, .values = std::move(values)});
+  recording.add({.name = "torque_Nm", .values = std::move(torque_Nm)});
+  Dataset dataset;
+  const std::size_t samples = recording.size();
+  dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
+  return dataset;
+}
+
 /// A ramp with small reversals: its last third is beyond the other two.
 Dataset dataset_that_never_returns() {
   std::vector<double> deflection_rad;
@@ -60,14 +72,8 @@ Dataset dataset_that_never_returns() {
     deflection_rad.push_back(1e-4 * n + 1e-3 * std::sin(0.2 * n));
     torque_Nm.push_back(200.0 * deflection_rad.back() + 0.3 * std::cos(0.2 * n));
   }
-  Recording recording("ramp", 100.0);
-  recording.add({.name = "spring_deflection_rad", .values = std::move(deflection_rad)});
-  recording.add({.name = "torque_Nm", .values = std::move(torque_Nm)});
-  Dataset dataset;
-  const std::size_t samples = recording.size();
-  dataset.records.push_back(
-      {.recording = std::move(recording), .segments = {{0, samples, Role::train}}});
-  return dataset;
+  return dataset_of("spring_deflection_rad", 100.0, std::move(deflection_rad),
+                    std::move(torque_Nm));
 }
 
 TEST(TrainModel, AMotionThatNeverReturnsIsRefusedWithAModelThatCanBeTrained) {
@@ -92,11 +98,8 @@ TEST(TrainModel, ConstantSpeedsDetermineFriction) {
       speed_rad_s.push_back(speed + 0.002 * std::sin(1.7 * n));
       torque_Nm.push_back(0.52 * speed + std::copysign(0.57, speed) + 0.02 * std::sin(2.9 * n));
     }
-  Recording recording("speeds", 50.0);
-  recording.add({.name = "joint_speed_rad_s", .values = std::move(speed_rad_s)});
-  recording.add({.name = "torque_Nm", .values = std::move(torque_Nm)});
-  Dataset dataset;
-  dataset.records.push_back({.recording = recording, .segments = {{0, 1000, Role::train}}});
+  const Dataset dataset =
+      dataset_of("joint_speed_rad_s", 50.0, std::move(speed_rad_s), std::move(torque_Nm));
   const auto row_of = [&](const char* model, const char* name) {
     const auto choices = model_choices(dataset, model, {"joint_speed_rad_s"});
     const TrainedModel trained = train_model(dataset, choices.front(), 1);

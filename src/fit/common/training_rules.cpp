@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
-#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -65,12 +64,6 @@ void require_squares(const Range& range, const std::string& name) {
                                          1.0 / kLargestValue),
                  .found = fmt::format("{:g}", range.highest - range.lowest),
                  .advice = "Check the unit and the scale of the column, or the expression."});
-}
-
-bool is_speed(const InputInfo& input) {
-  if (input.is_rate) return true;
-  const auto channel = split_channel_name(input.expression);
-  return channel && (channel->unit->si_suffix == "rad_s" || channel->unit->si_suffix == "m_s");
 }
 
 }  // namespace
@@ -131,7 +124,7 @@ void require_trainable(const TrainingData& data) {
 
 // A step of an encoder is not a gap, however coarse it is. A joint that is driven at one speed after another moves.
 void require_motion(const TrainingData& data) {
-  if (is_speed(data.inputs.front())) return;
+  if (data.inputs.front().is_rate) return;
   std::vector<double> values;
   for (const Sequence& sequence : data.sequences)
     for (std::size_t n = 0; n < sequence.target.size(); ++n)
