@@ -3,13 +3,15 @@
 cmake_minimum_required(VERSION 3.25)
 
 set(header "paper,item,condition,quantity,value,unit")
-set(known_units Nm "Nm/deg" "Nm/(deg/s)" N m mm "cm3/Nm" deg % -)
-set(known_quantities RMSE MAE MAD STD BF "MAD ratio" "mean error ratio" "error percentage" torque twist "peak force" "spring movement" "outer radius" "inner radius" length "axial force" "force at flat" "volume per torque"
+set(known_units Nm "Nm/deg" "Nm s/deg" "Nm/(deg/s)" N m mm "cm3/Nm" deg % -)
+set(known_quantities RMSE MAE MAD STD BF "MAD ratio" "mean error ratio" "error percentage" torque twist "peak force" "force reduction"
+  "volume per torque reduction" "weight reduction" "MAE improvement" parameters strain "stiffness ratio" b1 f1 f2
+  d1 d2 d3 d4 k1 k2 k3 k4 k5 k6 k7 "spring movement" "outer radius" "inner radius" length "axial force" "force at flat" "volume per torque"
   "p0 spring" "p1 spring" "p2 spring" "p3 spring" "p0 gear" "p1 gear" "p2 gear" "p3 gear")
 set(items_000 "Fig. 8" "Table 3" "section 3.1" "section 6.1")
-set(items_001 "Fig. 6")
-set(items_002 "section II-B" "section II-C" "Table I" "Fig. 8" "Fig. 10" "Table III" "section III-C")
-set(items_003 "Table 2" "Table 3" "section 4.2.1" "section 4.3")
+set(items_001 "Fig. 6" "section 4.2")
+set(items_002 "section II-B" "section II-C" "Table I" "Fig. 8" "Fig. 10" "Table III" "section III-C" "section IV-B" "section V")
+set(items_003 "Table 2" "Table 3" "Fig. 4" "Fig. 7" "section 3.3" "section 4.2.1" "section 4.3")
 set(items_004 "Table 4" "Table 5" "Table 6" "section 5.2")
 set(items_boucwen published)  # sources: docs/results/benchmarks.md
 set(items_emps published)

@@ -150,11 +150,12 @@ struct PayloadScores {
 };
 
 /// The ways of identifying: linear models, learned ones, and those with links that are not exact.
-constexpr std::array kWays{"payload, linear springs", "payload, grey_box",
-                           "payload, grey_box, links wrong by 1 % and 2 mm"};
+constexpr std::array kCalibrationWays{"payload, linear springs", "payload, grey_box",
+                                      "payload, grey_box, links wrong by 1 % and 2 mm"};
 
 void identify_with(const BenchedArm& arm, const ArmRun& run, Random& random,
-                   std::array<PayloadScores, kWays.size()>& scores, const BodyInertia& truth) {
+                   std::array<PayloadScores, kCalibrationWays.size()>& scores,
+                   const BodyInertia& truth) {
   const ArmMotion linear = motion_of_models(run, arm.linear);
   const ArmMotion learned = motion_of_models(run, arm.learned);
   scores[0].add(identify_payload(arm.setup.arm, {&linear, 1},
@@ -344,8 +345,9 @@ Study arm_identification_000(const StudyOptions& options, const Progress& progre
           payloads, kPayloadMoves),
       .unit = "",
       .options = options};
-  std::array<PayloadScores, kWays.size()> scores;
-  for (std::size_t w = 0; w < kWays.size(); ++w) scores[w].condition = kWays[w];
+  std::array<PayloadScores, kCalibrationWays.size()> scores;
+  for (std::size_t w = 0; w < kCalibrationWays.size(); ++w)
+    scores[w].condition = kCalibrationWays[w];
   std::vector<CalibrationScores> calibrated(arm6_setup().joints.size());
   std::vector<QuantityRow> link_rows;
   for (const ArmJointSetup& joint : arm6_setup().joints)

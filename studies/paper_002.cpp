@@ -11,22 +11,18 @@
 #include <utility>
 #include <vector>
 
+#include "figure_curves.hpp"
 #include "published.hpp"
+#include "sensor_bench.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/evaluate/comparison.hpp"
-#include "torsio/sim/experiments/experiment.hpp"
+#include "torsio/evaluate/estimate_recording.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr const char* kActuator = "rubber-clutch";
-constexpr double kFullScale_Nm = 0.5;  // where the clutch slips
-constexpr const char* kSensorTwist = "input_angle_rad - joint_angle_rad";
-constexpr const char* kSensorTwistRate = "lowpass(rate(input_angle_rad - joint_angle_rad), 10Hz)";
 constexpr const char* kMultisine = "multisine";
-/// A network with memory is not valid before; the other models are not scored there either.
-constexpr std::size_t kWarmUp = 200;
 
 constexpr const char* kPapersModel = "improved PGPR";
 
@@ -34,34 +30,27 @@ constexpr const char* kPapersModel = "improved PGPR";
 constexpr const char* kTable2 =
     "21.5113/11.8339/-5.4362/-6.5416/-8.7194/5.9948/-2.5506/-5.3729/-5.1467";
 
-/// A model of the table: what it is called, and how `--models` would ask for it.
-struct SensorCandidate {
-  std::string label;
-  std::string model;
-  bool has_rate = false;  ///< given the twist's rate besides
-};
-
 /// The candidates of the paper: n_y = n_u = 8 (Table II), that is 7 past torques and 8 twists,
 /// trained one step ahead with the number of updates of Algorithm 1.
 std::vector<SensorCandidate> papers_candidates(bool is_quick) {
   const std::string one_step = "input_lags=7:output_lags=7:training=one_step";
   const int updates = is_quick ? 2000 : 200000;
-  const auto pgpr = [&](const char* mode, const char* kernel) {
-    return fmt::format("narx_parametric_gp:{}:updates={}:mode={}{}", one_step, updates, mode,
-                       kernel);
+  const auto pgpr = [&](const char* family, const char* kernel) {
+    return fmt::format("narx_parametric_gp{}:{}:updates={}{}", family, one_step, updates, kernel);
   };
   constexpr const char* kPlain = ":kernel=se";
   return {
       {"GP", fmt::format("narx_gaussian_process:{}:kernel=se:std_dev=false:samples={}", one_step,
                          is_quick ? 100 : 1000)},
       {"NN", fmt::format("narx_mlp:{}:epochs={}", one_step, is_quick ? 3 : 30)},
-      {"PGPR", pgpr("paper", kPlain)},
-      {"LSTM", fmt::format("lstm:layers={}:epochs={}", is_quick ? 8 : 32, is_quick ? 2 : 30)},
-      {kPapersModel, pgpr("paper", "")},
+      {"PGPR", pgpr("_paper", kPlain)},
+      {"LSTM", fmt::format("narx_lstm:{}:layers={}:epochs={}", one_step, is_quick ? 8 : 32,
+                           is_quick ? 2 : 30)},
+      {kPapersModel, pgpr("_paper", "")},
       {"improved PGPR, Table II",
        fmt::format("narx_parametric_gp:{}:updates={}:kernel_plain={}", one_step, updates, kTable2)},
-      {"PGPR, corrected", pgpr("recommended", kPlain)},
-      {"improved PGPR, corrected", pgpr("recommended", "")}};
+      {"PGPR, corrected", pgpr("", kPlain)},
+      {"improved PGPR, corrected", pgpr("", "")}};
 }
 
 /// The same models, but that they learn to forget errors of what is fed back to them.
@@ -75,6 +64,8 @@ std::vector<SensorCandidate> our_candidates(bool is_quick) {
           {"variational GP, noise",
            fmt::format("narx_parametric_gp_variational:{}:inducing_points={}:samples={}", noise,
                        is_quick ? 20 : 100, is_quick ? 500 : 5000)},
+          {"LSTM, without feedback",
+           fmt::format("lstm:layers={}:epochs={}", is_quick ? 8 : 32, is_quick ? 2 : 30)},
           {"GRU", fmt::format("gru:layers={}:epochs={}", is_quick ? 8 : 32, is_quick ? 2 : 30)}};
 }
 
@@ -103,37 +94,6 @@ std::vector<SensorCandidate> few_candidates(bool is_quick) {
   return candidates;
 }
 
-Recording recorded(const std::string& experiment, std::uint64_t seed) {
-  return simulate(
-      {.actuator = kActuator, .experiment = experiment, .seed = seed, .with_truth = true});
-}
-
-struct SensorBench {
-  Dataset dataset;
-  StudyConditions conditions = {};
-
-  void add_test(const Recording& from, const std::string& condition, std::size_t begin,
-                std::size_t end) {
-    // Two parts of one recording have separate scores.
-    Recording recording(fmt::format("{} {}", from.name(), conditions.size()), from.sample_rate_Hz(),
-                        from.time_s(0));
-    for (const Channel& channel : from.channels()) recording.add(channel);
-    conditions.add(recording.name(), condition);
-    dataset.records.push_back({std::move(recording), {{begin, end, Role::test}}});
-  }
-};
-
-/// Trained on the grid. No model is initialised with the measured torque: all start from rest, as
-/// the bench.
-SensorBench trained_on_grid(std::uint64_t seed) {
-  SensorBench bench;
-  Recording grid = recorded("grid", seed);
-  const std::size_t samples = grid.size();
-  bench.dataset.records.push_back({std::move(grid), whole_record(samples, Role::train)});
-  bench.dataset.initialise_samples = 0;
-  return bench;
-}
-
 /// Where the clutch begins to slip; the end if it holds.
 std::size_t first_slip(const Recording& recording) {
   constexpr double kSlipped_rad = 1e-3;
@@ -143,31 +103,26 @@ std::size_t first_slip(const Recording& recording) {
       slip.begin());
 }
 
-void compare_into(StudyRows& rows, const SensorBench& bench,
-                  const std::vector<SensorCandidate>& candidates, std::uint64_t seed,
-                  const Progress& progress) {
-  std::vector<ModelChoice> choices;
-  std::vector<std::pair<std::string, std::string>> models;  // name of each choice
-  for (const SensorCandidate& candidate : candidates) {
-    std::vector<std::string> inputs{kSensorTwist};
-    if (candidate.has_rate) inputs.emplace_back(kSensorTwistRate);
-    choices.push_back(model_choices(bench.dataset, candidate.model, inputs).front());
-    models.emplace_back(choices.back().family, choices.back().variant());
-  }
-  const Results results = compare(bench.dataset, choices, seed, false, progress).results;
-  rows.add(
-      results, bench.dataset, Role::test,
-      [&](const std::string& recording) { return bench.conditions.of(recording); },
-      [&](const ResultRow& row) {
-        const auto found = std::ranges::find(models, std::pair(row.family, row.variant));
-        return candidates[static_cast<std::size_t>(found - models.begin())].label;
-      });
-}
-
 const ErrorRow& best_of(const std::vector<ErrorRow>& rows, std::string_view named) {
   return *std::ranges::min_element(rows, {}, [&](const ErrorRow& row) {
     return std::pair(!row.model.starts_with(named), row.rmse);
   });
+}
+
+/// The abstract's claim about the largest errors of the paper's own five models.
+std::string improvement_text(const std::vector<ErrorRow>& rows) {
+  double proposed_Nm = kNotMeasured;
+  double largest_Nm = 0.0;
+  for (const ErrorRow& row : rows) {
+    if (row.model == kPapersModel) proposed_Nm = row.max_abs;
+    if (row.model == "GP" || row.model == "NN" || row.model == "PGPR" || row.model == "LSTM")
+      largest_Nm = std::max(largest_Nm, row.max_abs);
+  }
+  return fmt::format(
+      "largest error of {} below the largest of GP, NN, PGPR and LSTM by {:.2f} % of FS; printed: "
+      "up to {}",
+      kPapersModel, 100.0 * (largest_Nm - proposed_Nm) / kSensorFullScale_Nm,
+      paper_figure("002", "section V", "against other models", "MAE improvement").text);
 }
 
 /// The results of one condition compared with the paper's claim.
@@ -181,12 +136,12 @@ std::vector<std::string> verdicts(const std::vector<ErrorRow>& rows) {
     if (row.model.find("PGPR") == std::string::npos) continue;
     notes.push_back(fmt::format("{}: {} a linear ARX ({:.2f} % of FS against {:.2f} of {})",
                                 row.model, row.rmse < arx.rmse ? "beats" : "does not beat",
-                                100.0 * row.rmse / kFullScale_Nm, 100.0 * arx.rmse / kFullScale_Nm,
-                                arx.model));
+                                100.0 * row.rmse / kSensorFullScale_Nm,
+                                100.0 * arx.rmse / kSensorFullScale_Nm, arx.model));
   }
   const ErrorRow& best = best_of(rows, "");
   notes.push_back(
-      fmt::format("best: {}, {:.2f} % of FS", best.model, 100.0 * best.rmse / kFullScale_Nm));
+      fmt::format("best: {}, {:.2f} % of FS", best.model, 100.0 * best.rmse / kSensorFullScale_Nm));
   return notes;
 }
 
@@ -195,14 +150,34 @@ Study study_of(std::string protocol, const StudyOptions& options,
   Study study{.protocol = std::move(protocol),
               .unit = "Nm",
               .options = options,
-              .plants = {study_plant(kActuator)}};
+              .plants = {study_plant(kSensorActuator)}};
   for (const SensorCandidate& candidate : candidates)
     study.notes.push_back(fmt::format("model {}: {}", candidate.label, candidate.model));
   return study;
 }
 
 ErrorTable sensor_table(const StudyRows& rows) {
-  return {.rows = rows.errors(), .full_scale = kFullScale_Nm};
+  return {.rows = rows.errors(), .full_scale = kSensorFullScale_Nm};
+}
+
+/// Figure 11: the measured torque of one multisine, and the paper's five models on it.
+XyFigure validation_figure(const SensorBench& bench, const std::vector<SensorCandidate>& candidates,
+                           const std::vector<ComparedModel>& models) {
+  constexpr std::array<std::string_view, 5> kDrawn{"GP", "NN", "PGPR", "LSTM", kPapersModel};
+  const Recording& recording = bench.dataset.records.at(1).recording;
+  const Thinning thinning{.rate_Hz = recording.sample_rate_Hz(), .step = 5};
+  XyFigure figure = trace_figure("Figure 11", "torque [Nm]");
+  add_trace(figure, "measured", recording.channel("torque_Nm").values, CurveRole::measured,
+            thinning);
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (std::ranges::find(kDrawn, candidates[i].label) == kDrawn.end()) continue;
+    const EstimatedRecording estimated =
+        estimate_recording(make_estimator(models[i].file), recording);
+    add_trace(figure, candidates[i].label,
+              estimated.channels.channel(estimate_channel("torque_Nm")).values, CurveRole::model,
+              thinning);
+  }
+  return figure;
 }
 
 /// A study of experiments that the clutch may slip in, until it does and once it has.
@@ -214,7 +189,7 @@ Study beyond_slip(Study study, const std::vector<std::string>& experiments,
     const std::uint64_t seed = repeat_seed(options, k);
     SensorBench bench = trained_on_grid(seed);
     for (const std::string& experiment : experiments) {
-      const Recording recording = recorded(experiment, seed + kFirstTestSeed);
+      const Recording recording = sensor_recording(experiment, seed + kFirstTestSeed);
       const std::size_t slip = first_slip(recording);
       bench.add_test(recording, experiment + ", clutch holds", 0, slip);
       if (slip < recording.size())
@@ -242,10 +217,12 @@ Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
     const std::uint64_t seed = repeat_seed(options, k);
     SensorBench bench = trained_on_grid(seed);
     for (std::size_t i = 0; i < multisines; ++i) {
-      const Recording recording = recorded(kMultisine, seed + kFirstTestSeed + i);
-      bench.add_test(recording, kMultisine, kWarmUp, recording.size());
+      const Recording recording = sensor_recording(kMultisine, seed + kFirstTestSeed + i);
+      bench.add_test(recording, kMultisine, kSensorWarmUp, recording.size());
     }
-    compare_into(rows, bench, candidates, seed, nth_of(progress, k, options.repeats, kActuator));
+    const std::vector<ComparedModel> models = compare_into(
+        rows, bench, candidates, seed, nth_of(progress, k, options.repeats, kSensorActuator));
+    if (k == 0) study.figures.emplace_back(validation_figure(bench, candidates, models));
   }
   const ErrorTable table = sensor_table(rows);
   study.table = table;
@@ -253,6 +230,7 @@ Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
       "paper %, paper max %: Table III, measured on its own hardware; the paper prints no "
       "normaliser and no "
       "parameters of its multisine, and trained its GP on part of the data");
+  study.notes.push_back(improvement_text(table.rows));
   std::ranges::move(verdicts(table.rows), std::back_inserter(study.notes));
   return study;
 }

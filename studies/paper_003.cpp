@@ -9,10 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "figure_curves.hpp"
 #include "published.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/evaluate/comparison.hpp"
+#include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
@@ -81,6 +83,24 @@ ModelSequence sequence_of(const std::string& coupling, std::uint64_t seed, bool 
   return sequence;
 }
 
+/// Figure 10 (b): the errors of both steps of the Hammerstein-Wiener model over the triangles of the test.
+XyFigure error_figure(const ModelSequence& sequence, const std::vector<ComparedModel>& models) {
+  const Recording& recording = sequence.dataset.records.at(1).recording;
+  XyFigure figure = trace_figure("Figure 10: error of the torque", "error [Nm]");
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const std::string_view name = kSequence.at(i).name;
+    if (name != "Hammerstein-Wiener" && name != "refined in continuous time") continue;
+    const EstimatedRecording estimated =
+        estimate_recording(make_estimator(models[i].file), recording);
+    std::vector<double> error_Nm = estimated.channels.channel(estimate_channel("torque_Nm")).values;
+    for (std::size_t n = 0; n < error_Nm.size(); ++n)
+      error_Nm[n] -= recording.channel("torque_Nm").values[n];
+    add_trace(figure, std::string(name), error_Nm, CurveRole::model,
+              {.rate_Hz = recording.sample_rate_Hz(), .step = 1});
+  }
+  return figure;
+}
+
 std::string models() {
   std::string text;
   for (const ModelStep& step : kSequence)
@@ -106,9 +126,10 @@ Study models_003(const StudyOptions& options, const Progress& progress) {
       const std::uint64_t seed = repeat_seed(options, k);
       ModelSequence sequence = sequence_of(kCouplings[c], seed, options.is_quick);
       const auto choices = model_choices(sequence.dataset, models(), {"spring_deflection_rad"});
-      const Results results = compare(sequence.dataset, choices, seed, false, part).results;
+      const Comparison compared = compare(sequence.dataset, choices, seed, false, part);
+      if (c == 0 && k == 0) study.figures.emplace_back(error_figure(sequence, compared.models));
       rows.add(
-          results, sequence.dataset, Role::test,
+          compared.results, sequence.dataset, Role::test,
           [&](const std::string& recording) { return sequence.conditions.of(recording); },
           [&](const ResultRow& row) {
             const auto choice = std::ranges::find_if(choices, [&](const ModelChoice& each) {

@@ -17,10 +17,7 @@ using design::StrainMetric;
 constexpr double kLimit = 0.6;  // strain of Table 2
 
 const PaperFigure& figure_of(std::string_view geometry, std::string_view quantity) {
-  return *std::ranges::find_if(kPaperFigures, [&](const PaperFigure& each) {
-    return each.paper == "003" && each.item == "Table 2" && each.condition == geometry &&
-           each.quantity == quantity;
-  });
+  return *find_paper_figure("003", "Table 2", geometry, quantity);
 }
 
 struct Twisted {
@@ -74,6 +71,94 @@ void add_rows(QuantityTable& table, const Twisted& each, double modulus_MPa) {
   table.rows.push_back({each.geometry, "twist at 60 % strain, outside 0.3 mm",
                         angle_deg.value_or(kNotMeasured), "deg", figure_of(each.geometry, "twist"),
                         angle_deg ? "" : "not reached up to the printed twist"});
+}
+
+/// Torques at the twists of Table 2 with the modulus that gives alpha its torque: a prediction of the others from
+/// one number of the table.
+void add_prediction(QuantityTable& table, const std::vector<Twisted>& all) {
+  const auto alpha = std::ranges::find(all, "alpha", &Twisted::geometry);
+  if (alpha == all.end() || !alpha->unit_Nm) return;
+  const double modulus_MPa = alpha->torque.value / *alpha->unit_Nm;
+  const auto rank = [&](const Twisted& of, const auto& torque_of) {
+    return 1 + std::ranges::count_if(
+                   all, [&](const Twisted& other) { return torque_of(other) > torque_of(of); });
+  };
+  const auto ours = [&](const Twisted& of) { return of.unit_Nm ? modulus_MPa * *of.unit_Nm : 0.0; };
+  const auto papers = [](const Twisted& of) { return of.torque.value; };
+  table.rows.push_back({"predicted", "shear modulus from alpha alone", modulus_MPa, "MPa", {}, ""});
+  for (const Twisted& each : all)
+    table.rows.push_back(
+        {"predicted", fmt::format("torque of {} at {:g} deg", each.geometry, each.demand.angle_deg),
+         each.unit_Nm ? ours(each) : kNotMeasured, "Nm", each.torque,
+         fmt::format("place {} of {}, printed {}{}", rank(each, ours), all.size(),
+                     rank(each, papers), each.geometry == "alpha" ? "; by definition" : "")});
+}
+
+/// By lines between converged steps; NaN beyond the last.
+double strain_at(const design::LobeCurve& lobe, double angle_deg) {
+  double before_deg = 0.0;
+  double before = 0.0;
+  for (const design::TwistStep& step : lobe.curve.steps) {
+    const double now_deg = std::abs(step.twist_deg);
+    const double now = strain_of(step, StrainMetric::outside_300um);
+    if (now_deg >= angle_deg)
+      return before + (now - before) * (angle_deg - before_deg) / (now_deg - before_deg);
+    before_deg = now_deg;
+    before = now;
+  }
+  return kNotMeasured;
+}
+
+/// Figures 4 and 5: the strains of both lobes at 9 and 12 degrees, on the coarse mesh.
+void add_strains(QuantityTable& table, const std::string& geometry,
+                 const design::CouplingTwist& twist) {
+  for (const double angle_deg : {9.0, 12.0})
+    for (const auto& [name, lobe] :
+         {std::pair{"compressed", &twist.compressed}, std::pair{"stretched", &twist.stretched}}) {
+      std::optional<PaperFigure> published;
+      const bool is_compressed = lobe == &twist.compressed;
+      if (is_compressed && geometry == "delta" && angle_deg == 9.0)
+        published = paper_figure("003", "Fig. 4", "delta at 9 deg", "strain");
+      if (is_compressed && geometry == "zeta" && angle_deg == 12.0)
+        published = paper_figure("003", "Fig. 4", "zeta at 12 deg", "strain");
+      table.rows.push_back(
+          {geometry, fmt::format("strain at {:g} deg, {}, outside 0.3 mm, coarse", angle_deg, name),
+           100.0 * strain_at(*lobe, angle_deg), "%", published,
+           published && geometry == "zeta" ? "printed: below 60 %" : ""});
+    }
+}
+
+/// Figures 5 and 6 drawn: strain and torque over the twist.
+void add_figures(Study& study, const std::vector<Twisted>& all,
+                 const std::vector<design::CouplingTwist>& curves, double modulus_MPa) {
+  XyFigure strains{.title = "Figure 5", .x = {"twist [deg]"}, .y = {"strain [%]"}, .series = {}};
+  XyFigure torques{.title = "Figure 6", .x = {"twist [deg]"}, .y = {"torque [Nm]"}, .series = {}};
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    XySeries strain{.label = all[i].geometry, .x = {}, .y = {}};
+    for (const auto& [lobe, sign] :
+         {std::pair{&curves[i].stretched, -1.0}, std::pair{&curves[i].compressed, 1.0}}) {
+      std::vector<std::pair<double, double>> points;
+      for (const design::TwistStep& step : lobe->curve.steps)
+        points.emplace_back(sign * std::abs(step.twist_deg),
+                            100.0 * strain_of(step, StrainMetric::outside_300um));
+      std::ranges::sort(points);
+      for (const auto& [x, y] : points) {
+        strain.x.push_back(x);
+        strain.y.push_back(y);
+      }
+    }
+    strains.series.push_back(std::move(strain));
+    XySeries torque{.label = all[i].geometry, .x = {}, .y = {}};
+    const auto curve = torque_curve(curves[i], all[i].demand.length_mm, modulus_MPa);
+    for (double angle_deg = 0.5; angle_deg <= 15.0; angle_deg += 0.5)
+      if (const auto torque_Nm = design::torque_at(curve, angle_deg)) {
+        torque.x.push_back(angle_deg);
+        torque.y.push_back(*torque_Nm);
+      }
+    torques.series.push_back(std::move(torque));
+  }
+  study.figures = {std::move(strains), std::move(torques)};
+  study.figure_columns = 2;
 }
 
 /// The strains of Figure 5 reach 15 degrees for both lobes: as far as the solver converges, on the coarse mesh.
@@ -146,8 +231,12 @@ Study coupling_003(const StudyOptions& options, const Progress& progress) {
                         {},
                         "on six torques of Table 2, without beta"});
   for (const Twisted& each : all) add_rows(table, each, modulus_MPa);
-  for (std::size_t i = 0; i < curves.size(); ++i)
+  add_prediction(table, all);
+  for (std::size_t i = 0; i < curves.size(); ++i) {
     add_curve(table, all[i].geometry, curves[i], all[i].demand.length_mm, modulus_MPa);
+    add_strains(table, all[i].geometry, curves[i]);
+  }
+  if (!curves.empty()) add_figures(study, all, curves, modulus_MPa);
   study.table = std::move(table);
   study.notes.emplace_back(
       "This is a fit: the modulus is fitted on the torques beside which it is printed, and the "

@@ -151,14 +151,10 @@ void add_full_scale(const ErrorTable& table, std::vector<Column<ErrorRow>>& colu
   columns.push_back({"% of FS", [full_scale](const Row& row) {
                        return fmt::format("{:.1f}", 100.0 * row.max_abs / full_scale);
                      }});
-  const auto any = [&](const auto& has) { return std::ranges::any_of(table.rows, has); };
-  if (any([](const Row& row) { return std::isfinite(row.one_step); }))
+  if (std::ranges::any_of(table.rows, [](const Row& row) { return std::isfinite(row.one_step); }))
     columns.push_back({"1 step", [](const Row& row) {
                          return std::isfinite(row.one_step) ? number(row.one_step) : std::string();
                        }});
-  if (any([](const Row& row) { return row.guarded_percent > 0.0; }))
-    columns.push_back(
-        {"guard %", [](const Row& row) { return fmt::format("{:.1f}", row.guarded_percent); }});
 }
 
 std::vector<Column<ErrorRow>> columns_of(const ErrorTable& table, const std::string& unit) {
@@ -169,6 +165,9 @@ std::vector<Column<ErrorRow>> columns_of(const ErrorTable& table, const std::str
       {"% of max", [](const Row& row) { return fmt::format("{:.1f}", row.percent); }},
       {"max", [](const Row& row) { return number(row.largest); }}};
   if (table.full_scale) add_full_scale(table, columns);
+  if (std::ranges::any_of(table.rows, [](const Row& row) { return row.guarded_percent > 0.0; }))
+    columns.push_back(
+        {"guard %", [](const Row& row) { return fmt::format("{:.1f}", row.guarded_percent); }});
   columns.push_back({"runs", [](const Row& row) { return fmt::format("{}", row.runs); }});
   if (table.shows_fit_time)
     columns.push_back(

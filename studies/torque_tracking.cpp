@@ -16,18 +16,17 @@
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
-#include "torsio/fit/train_model.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
+#include "tracking_models.hpp"
 
 namespace torsio {
 namespace {
 
 using Kind = TorqueReference::Kind;
 
-constexpr std::array kVariants{"maxwell-slip", "bouc-wen", "lugre"};
+constexpr std::array kTrackedVariants{"maxwell-slip", "bouc-wen", "lugre"};
 constexpr double kQuick_s = 20.0;
 constexpr double kObserver_Hz = 8.0;  // loop with feed-forward and observer
 
@@ -43,53 +42,19 @@ constexpr std::array kTasks{
     Task{"dfki-120", 20.0, JointOutput::locked, true}, Task{"dfki-120", 20.0, JointOutput::free},
     Task{"dfki-120", 70.0, JointOutput::locked}};
 
-/// A family in the inverse; those that this build does not have are left out.
+/// The families of this study; those that this build does not have are left out.
 struct Learner {
-  std::string_view family;
-  bool is_turned_round = false;  ///< trained with the deflection as its target
-  bool is_quick = false;         ///< also in the quick study
+  LoopFamily family;
+  bool is_quick = false;  ///< also in the quick study
 };
-constexpr std::array kLearners{Learner{"linear", false, true},     Learner{"linear_coulomb"},
-                               Learner{"polynomial", false, true}, Learner{"maxwell_slip"},
-                               Learner{"prandtl_ishlinskii"},      Learner{"grey_box"},
-                               Learner{"dgmm", false, true},       Learner{"mlp", true}};
+constexpr std::array kLearners{Learner{kLoopLine, true},        Learner{{"linear_coulomb"}},
+                               Learner{{"polynomial"}, true},   Learner{{"maxwell_slip"}},
+                               Learner{{"prandtl_ishlinskii"}}, Learner{{"grey_box"}},
+                               Learner{kLoopMixture, true},     Learner{kLoopNetwork}};
 
 bool exists(std::string_view family) {
   return std::ranges::any_of(families(),
                              [&](const FamilyInfo& info) { return info.name == family; });
-}
-
-/// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of
-/// the data sheet, other amplitudes, the same output (specification 6, observation 1).
-void add_torque_mode(Dataset& dataset, const std::string& actuator, const Task& task, Kind kind,
-                     std::uint64_t seed, bool is_quick) {
-  const bool is_locked = task.output == JointOutput::locked;
-  for (const double share : {is_locked ? 1.1 : 0.9, 0.5, 0.25}) {
-    ExperimentSpec spec{.actuator = actuator,
-                        .experiment = std::string(name(kind)),
-                        .seed = seed + 10 + dataset.records.size(),
-                        .torque_amplitude_Nm = share * task.amplitude_Nm};
-    if (!is_locked) spec.lever_m = TrackingSpec{}.lever_m;
-    if (is_quick) spec.duration_s = kQuick_s;
-    Recording recording = simulate(spec);
-    const std::size_t samples = recording.size();
-    dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
-  }
-}
-
-AnyInverse learned(const Learner& learner, const Dataset& dataset, std::uint64_t seed) {
-  ModelChoice choice{.family = std::string(learner.family), .features = {}};
-  if (learner.is_turned_round) {
-    Dataset turned = dataset;
-    swap_input_and_target(turned);
-    choice.features = resolve_inputs(turned, turned.input_sets.front().second);
-    return inverse_of(train_model(turned, choice, seed).file);
-  }
-  const bool is_line = learner.family == "linear";
-  choice.features =
-      resolve_inputs(dataset, is_line ? std::vector<std::string>{"spring_deflection_rad"}
-                                      : std::vector<std::string>{});
-  return inverse_of(train_model(dataset, choice, seed).file);
 }
 
 /// Every family of this study on the same data.
@@ -97,9 +62,9 @@ std::vector<NamedInverse> all_learned(const Dataset& dataset, std::string_view t
                                       std::uint64_t seed, bool is_quick) {
   std::vector<NamedInverse> inverses;
   for (const Learner& learner : kLearners) {
-    if (!exists(learner.family) || (is_quick && !learner.is_quick)) continue;
-    inverses.push_back(
-        {fmt::format("{}, {}", learner.family, trained_on), learned(learner, dataset, seed)});
+    if (!exists(learner.family.name) || (is_quick && !learner.is_quick)) continue;
+    inverses.push_back({fmt::format("{}, {}", learner.family.name, trained_on),
+                        learned_inverse(learner.family, dataset, seed)});
   }
   return inverses;
 }
@@ -210,7 +175,13 @@ void run_task(const Task& task, const std::string& actuator, std::uint64_t seed,
   std::vector<NamedInverse> inverses = all_learned(dataset, "sweeps", seed, options.is_quick);
   inverses.erase(inverses.begin());  // the line of the sweeps is run anyway
   const auto train_more = [&](Kind kind, std::string_view trained_on) {
-    add_torque_mode(dataset, actuator, task, kind, seed, options.is_quick);
+    add_torque_mode(dataset,
+                    {.actuator = actuator,
+                     .amplitude_Nm = task.amplitude_Nm,
+                     .output = task.output,
+                     .kind = kind,
+                     .seed = seed,
+                     .duration_s = options.is_quick ? std::optional(kQuick_s) : std::nullopt});
     for (NamedInverse& more : all_learned(dataset, trained_on, seed, options.is_quick))
       inverses.push_back(std::move(more));
   };
@@ -238,13 +209,13 @@ Study torque_tracking_000(const StudyOptions& options, const Progress& progress)
       .unit = "Nm",
       .options = options};
   const std::span<const Task> tasks = std::span(kTasks).first(options.is_quick ? 1 : kTasks.size());
-  const std::size_t variants = options.is_quick ? 1 : kVariants.size();
+  const std::size_t variants = options.is_quick ? 1 : kTrackedVariants.size();
   const std::size_t parts = tasks.size() * variants * options.repeats;
   TrackingRows rows;
   std::size_t done = 0;
   for (const Task& task : tasks) {
     for (std::size_t v = 0; v < variants; ++v) {
-      const std::string actuator = fmt::format("{}:{}", task.actuator, kVariants[v]);
+      const std::string actuator = fmt::format("{}:{}", task.actuator, kTrackedVariants[v]);
       const bool is_new = std::ranges::none_of(
           study.plants, [&](const StudyPlant& plant) { return plant.name == actuator; });
       if (is_new) study.plants.push_back(study_plant(actuator));

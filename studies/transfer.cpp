@@ -21,7 +21,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kNew_s = 10.0;
+constexpr double kFewData_s = 10.0;
 constexpr double kReference_s = 60.0;
 constexpr unsigned kFirstSpecimen = 11;
 constexpr std::size_t kSpecimens = 5;
@@ -124,7 +124,7 @@ void add_pair(QuantityTable& table, const Pair& pair, const ModelFile& base, std
   std::string methods;
   for (std::size_t k = 0; k < specimens; ++k) {
     const auto serial = kFirstSpecimen + static_cast<unsigned>(k);
-    const Dataset few = new_joint(pair.joint, serial, kNew_s, seed + 100 * (k + 1));
+    const Dataset few = new_joint(pair.joint, serial, kFewData_s, seed + 100 * (k + 1));
     const TransferEvaluation evaluation = evaluate_transfer(base, few, options, 1, progress);
     const Dataset more = new_joint(pair.joint, serial, kReference_s, seed + 100 * (k + 1) + 50);
     // A locked joint has no speed to learn from.
@@ -171,7 +171,7 @@ Study few_data_transfer(const StudyOptions& options, const Progress& progress) {
           "joint: {:g} s of a locked chirp of half the rated torque, 0.05 to 0.3 Hz; test: sweep "
           "and walk within that range; reference: its own grey box of {:g} s of the same chirp; "
           "{} specimens",
-          kNew_s, kReference_s, kSpecimens),
+          kFewData_s, kReference_s, kSpecimens),
       .unit = "Nm",
       .options = options};
   QuantityTable table;

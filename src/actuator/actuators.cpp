@@ -26,6 +26,7 @@ constexpr TubeSheet kSoftTube{
 constexpr TubeSheet kRigidTube{.ratio = printed(2.0),
                                .stiffness_Nm_rad = assumed(4000.0),
                                .damping_Nms_rad = assumed(1.26e-2)};
+constexpr double kNoClutch_Nm = 1e3;  // nothing on this bench reaches it
 constexpr double kGlueCreep = 0.003;  // a load cycle, specification 4.3
 
 // Specification 4.2. The winding resistance is assumed for motors of that class: it only bounds the
@@ -33,7 +34,7 @@ constexpr double kGlueCreep = 0.003;  // a load cycle, specification 4.3
 DataSheet dfki_28() {
   return {
       .name = "dfki-28",
-      .title = "28 Nm series-elastic actuator",
+      .title = "28 Nm series-elastic actuator with disc springs",
       .variants = kSpringVariants,
       .variant = kSpringVariants[0],
       .rating = {printed(28.0), printed(4.8), in_rad(printed(300.0))},
@@ -58,7 +59,7 @@ DataSheet dfki_28() {
 DataSheet dfki_50() {
   return {
       .name = "dfki-50",
-      .title = "50 Nm series-elastic actuator with a two-stage spring",
+      .title = "50 Nm series-elastic actuator with coil springs in two stages",
       .variants = kSpringVariants,
       .variant = kSpringVariants[0],
       .rating = {printed(50.0), printed(5.0), in_rad(printed(157.0))},
@@ -85,7 +86,7 @@ DataSheet dfki_50() {
 DataSheet dfki_120() {
   return {
       .name = "dfki-120",
-      .title = "120 Nm series-elastic actuator",
+      .title = "120 Nm series-elastic actuator with a torsion rod",
       .variants = kSpringVariants,
       .variant = kSpringVariants[0],
       .rating = {printed(120.0), printed(7.0), in_rad(printed(95.0))},
@@ -110,7 +111,7 @@ DataSheet dfki_120() {
 DataSheet dfki_300() {
   return {
       .name = "dfki-300",
-      .title = "300 Nm series-elastic actuator",
+      .title = "300 Nm series-elastic actuator with a torsion rod",
       .variants = kSpringVariants,
       .variant = kSpringVariants[0],
       .rating = {printed(300.0), printed(11.0), in_rad(printed(57.0))},
@@ -185,6 +186,8 @@ DataSheet rubber_clutch() {
       .family = ActuatorFamily::rubber_clutch,
       .name = "rubber-clutch",
       .title = "0.5 Nm torque sensor of rubber after a friction clutch",
+      .variants = {"measured", "designed", "no-clutch"},
+      .variant = "measured",
       .rating = {printed(0.5), assumed(0.75), assumed(10.0)},
       .motor = {.torque_constant_Nm_A = assumed(0.0164),
                 .rotor_inertia_kg_m2 = assumed(1e-6),
@@ -284,6 +287,15 @@ void mark_variant(DataSheet& sheet, std::string_view variant) {
     coupling->bonded = variant != "unbonded";
 }
 
+/// Rubber and clutch of paper 002 from its section II, not from its measurement (Figure 8): the ring of (1)
+/// with HS 60, L = 4 mm, r_1 = 10 mm and r_2 = 8.2 mm, and the disks of (5) at 204 N.
+void set_designed_sensor(DataSheet& sheet) {
+  auto& rubber = std::get<RubberSheet>(sheet.second);
+  rubber.stiffness_Nm_rad = derived(1.9359);
+  rubber.asymmetry_Nm_rad = derived(0.0);
+  std::get<ClutchSheet>(sheet.first).static_torque_Nm = derived(0.4998);
+}
+
 void set_variant(DataSheet& sheet, std::string_view variant) {
   mark_variant(sheet, variant);
   if (variant == "creeping")
@@ -291,6 +303,9 @@ void set_variant(DataSheet& sheet, std::string_view variant) {
   if (variant == "stiff") sheet.first = kStiffTube;
   if (variant == "soft") sheet.first = kSoftTube;
   if (variant == "rigid") sheet.first = kRigidTube;
+  if (variant == "designed") set_designed_sensor(sheet);
+  if (variant == "no-clutch")
+    std::get<ClutchSheet>(sheet.first).static_torque_Nm = assumed(kNoClutch_Nm);
 }
 
 }  // namespace torsio

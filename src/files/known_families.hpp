@@ -80,6 +80,7 @@ using AllFamilies = FamilyList<Linear,                        //
                                Narx<MultivariatePolynomial>,  //
                                Narx<Dgmm>,                    //
                                Narx<Mlp>,                     //
+                               Narx<Lstm>,                    //
                                Narx<GaussianProcess>,         //
                                Narx<ParametricGp>>;
 

@@ -2,16 +2,20 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <map>
 #include <numbers>
 #include <string>
+#include <string_view>
 #include <variant>
+#include <vector>
 
 #include "support/every_actuator.hpp"
 #include "support/series_elastic.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -146,6 +150,27 @@ TEST(DataSheet, TwoNamesOfTheSameSheetHaveTheSameHash) {
   EXPECT_NE(sheet_hash(changed), sheet_hash(data_sheet("dfki-50")));
 }
 
+double fact_of(const char* actuator, std::string_view name) {
+  for (const SheetRow& row : printed_facts(data_sheet(actuator)))
+    if (row.name == name) return row.value.value;
+  return kNotMeasured;
+}
+
+TEST(DataSheet, FactsOfThePapersAreNoValuesOfThePlant) {
+  EXPECT_DOUBLE_EQ(fact_of("dfki-300", "mass"), 4.6);
+  EXPECT_NEAR(deg_from_rad(fact_of("dfki-28#03", "rated_speed")), 190.0, 1e-9);
+  EXPECT_DOUBLE_EQ(fact_of("harmonic-drive:soft", "gear_efficiency"), 0.5);
+  for (const DataSheet& sheet : data_sheets()) {
+    const std::vector<SheetRow> facts = printed_facts(sheet);
+    EXPECT_FALSE(facts.empty()) << sheet.name;
+    for (const SheetRow& row : describe(sheet))
+      EXPECT_EQ(std::ranges::count(facts, row.name, &SheetRow::name), 0) << row.name;
+  }
+  DataSheet own = data_sheet("dfki-28");
+  own.name = "mine";
+  EXPECT_TRUE(printed_facts(own).empty());
+}
+
 TEST(DataSheet, UnknownNameListsTheKnownOnes) {
   try {
     static_cast<void>(data_sheet("dfki-500"));
@@ -183,7 +208,8 @@ std::string message_of(const char* name) {
 
 TEST(DataSheet, RefusesVariantsAndSerialNumbersThatItDoesNotHave) {
   EXPECT_NE(message_of("dfki-50:bouc").find("maxwell-slip, bouc-wen, lugre"), std::string::npos);
-  EXPECT_NE(message_of("rubber-clutch:soft").find("it has no variants"), std::string::npos);
+  EXPECT_NE(message_of("rubber-clutch:soft").find("measured, designed, no-clutch"),
+            std::string::npos);
   EXPECT_NE(message_of("dfki-50:").find("after the colon"), std::string::npos);
   for (const char* name : {"dfki-50#", "dfki-50#x", "dfki-50#-1", "dfki-50#10000", "dfki-50#3#4"})
     EXPECT_NE(message_of(name).find("0 to 9999"), std::string::npos) << name;

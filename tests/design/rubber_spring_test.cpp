@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <variant>
 
+#include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/design/clutch.hpp"
 
 namespace torsio {
 namespace {
@@ -25,6 +28,17 @@ TEST(RubberSpring, HasTheStiffnessAndStressOfThePrintedRing) {
   EXPECT_NEAR(shear_stress(ring, 0.5), 580980.0, 10.0);
   EXPECT_NEAR(objective(ring, demand_002()), 659.479, 1e-3);
   EXPECT_NEAR(stiffness_tolerance(ring, demand_002()), 0.175, 5e-4);
+}
+
+// The simulated sensor of that name follows from section II of the paper alone.
+TEST(RubberSpring, OfTheDesignedSensorIsThePrintedRingAndItsClutchThePrintedDisks) {
+  const DataSheet sheet = data_sheet("rubber-clutch:designed");
+  const RubberRing ring{0.010, 0.0082, 0.004};
+  EXPECT_NEAR(std::get<RubberSheet>(sheet.second).stiffness_Nm_rad.value,
+              stiffness(ring, shear_modulus_of_hardness(60.0)), 1e-4);
+  EXPECT_EQ(std::get<RubberSheet>(sheet.second).asymmetry_Nm_rad.value, 0.0);
+  EXPECT_NEAR(std::get<ClutchSheet>(sheet.first).static_torque_Nm.value,
+              204.0 * effective_arm({}, 0.2), 1e-4);
 }
 
 TEST(RubberSpring, OfPaper002IsTheShortestAndWidestRing) {

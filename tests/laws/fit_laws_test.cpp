@@ -75,10 +75,15 @@ TEST_P(FitLaws, AFitIsDeterministic) {
   EXPECT_EQ(first.model.input_count(), data_.input_count());
 }
 
+/// Algorithms that papers print are there for comparison: that of 000 (sign corrected) beats the mean, that of 002 may
+/// end as the zero function, which is a little worse than the mean.
+double least_fit_percent(std::string_view family) {
+  if (family == "dgmm_paper") return 0.0;
+  return family.ends_with("parametric_gp_paper") ? -5.0 : 80.0;
+}
+
 TEST_P(FitLaws, AFitExplainsASpringWithFriction) {
-  // The paper's algorithm (sign corrected) is there for comparison: it need only beat the mean.
-  const double least_percent = GetParam().family->name == "dgmm_paper" ? 0.0 : 80.0;
-  EXPECT_GT(evaluate(fit().model, data_).fit_percent, least_percent);
+  EXPECT_GT(evaluate(fit().model, data_).fit_percent, least_fit_percent(GetParam().family->name));
 }
 
 TEST_P(FitLaws, AFitStopsWhenAsked) {

@@ -270,7 +270,7 @@ TEST_F(BrokenCalls, OfReproduceNameWhatThereIs) {
   expect_error(torsio("reproduce 004-tubes --repeats 0"), kCallWasWrong, "repeats");
   expect_error(torsio("reproduce 004-tubes --json missing/x.json"), kCallWasWrong, "missing");
   expect_error(torsio("reproduce --plot x.svg"), kCallWasWrong,
-               "one item that has a figure: 000-arm");
+               "one item that has a figure: 001-figures");
   expect_error(torsio("reproduce 000-arm --plot x.gif"), kCallWasWrong, ".svg");
   expect_error(torsio("reproduce 000-brake --plot x.svg"), kCallWasWrong, "found 000-brake");
   EXPECT_NE(torsio("reproduce --list").out.find("001-models"), std::string::npos);

@@ -298,6 +298,10 @@ TEST_F(MainJob, WritesADescriptionOfTheSimulationAsJson) {
       nlohmann::json::parse(torsio("simulate --describe dfki-50:bouc-wen#03 --json -").out);
   EXPECT_EQ(sheet.at("name"), "dfki-50:bouc-wen#03");
   EXPECT_EQ(sheet.at("variant"), "bouc-wen");
+  EXPECT_EQ(sheet.at("printed_facts").at(2).at("name"), "mass");
+  EXPECT_EQ(sheet.at("printed_facts").at(2).at("value"), 2.5);
+  EXPECT_NE(torsio("simulate --describe harmonic-drive").out.find("printed, not used"),
+            std::string::npos);
   EXPECT_GT(sheet.at("longest_step_s"), 1e-5);
   EXPECT_LT(sheet.at("natural_frequencies_Hz").at(0), sheet.at("natural_frequencies_Hz").at(1));
 }

@@ -102,12 +102,19 @@ std::vector<torsio::SheetRow> sheet_rows(const torsio::DataSheet& sheet, bool is
   return rows;
 }
 
-std::string description(const torsio::DataSheet& sheet, bool is_electrical) {
+std::string rows_text(std::string_view heading, const std::vector<torsio::SheetRow>& rows) {
   torsio::TextTable table;
-  table.header({"parameter", "value", "unit", "origin"});
-  for (const torsio::SheetRow& row : sheet_rows(sheet, is_electrical))
+  table.header({std::string(heading), "value", "unit", "origin"});
+  for (const torsio::SheetRow& row : rows)
     table.row({row.name, fmt::format("{:.6g}", row.value.value), std::string(row.unit),
                std::string(1, static_cast<char>(row.value.origin))});
+  return table.text();
+}
+
+std::string description(const torsio::DataSheet& sheet, bool is_electrical) {
+  std::string tables = rows_text("parameter", sheet_rows(sheet, is_electrical));
+  if (const auto facts = torsio::printed_facts(sheet); !facts.empty())
+    tables += "\n" + rows_text("printed, not used", facts) + "\n";
   const torsio::PlantFigures plant = torsio::plant_figures(sheet);
   const auto [low_Hz, high_Hz] = plant.natural_frequencies_Hz;
   return fmt::format(
@@ -115,9 +122,8 @@ std::string description(const torsio::DataSheet& sheet, bool is_electrical) {
       "longest step: {:.3g} us\n"
       "natural frequencies, both ends free: {:.4g} Hz, {:.4g} Hz\n"
       "faults can be simulated in the sensors {} and in {}\n",
-      torsio::full_name(sheet), sheet.title, table.text(), 1e6 * plant.longest_step_s, low_Hz,
-      high_Hz, fmt::join(torsio::fault_sensors(sheet), ", "),
-      fmt::join(torsio::fault_parts(sheet), ", "));
+      torsio::full_name(sheet), sheet.title, tables, 1e6 * plant.longest_step_s, low_Hz, high_Hz,
+      fmt::join(torsio::fault_sensors(sheet), ", "), fmt::join(torsio::fault_parts(sheet), ", "));
 }
 
 /// Nm or rad, as the experiment has it. An unknown experiment, or one without amplitude, is refused
@@ -181,6 +187,16 @@ Json list_json() {
   return document;
 }
 
+Json rows_json(const std::vector<torsio::SheetRow>& rows) {
+  Json json = Json::array();
+  for (const torsio::SheetRow& row : rows)
+    json.push_back({{"name", row.name},
+                    {"value", row.value.value},
+                    {"unit", row.unit},
+                    {"origin", std::string(1, static_cast<char>(row.value.origin))}});
+  return json;
+}
+
 Json sheet_json(const torsio::DataSheet& sheet, bool is_electrical) {
   const torsio::PlantFigures plant = torsio::plant_figures(sheet);
   Json document{{"name", torsio::full_name(sheet)},
@@ -191,13 +207,8 @@ Json sheet_json(const torsio::DataSheet& sheet, bool is_electrical) {
                 {"natural_frequencies_Hz", plant.natural_frequencies_Hz},
                 {"fault_sensors", torsio::fault_sensors(sheet)},
                 {"fault_parts", torsio::fault_parts(sheet)},
-                {"parameters", Json::array()}};
-  for (const torsio::SheetRow& row : sheet_rows(sheet, is_electrical))
-    document["parameters"].push_back(
-        {{"name", row.name},
-         {"value", row.value.value},
-         {"unit", row.unit},
-         {"origin", std::string(1, static_cast<char>(row.value.origin))}});
+                {"parameters", rows_json(sheet_rows(sheet, is_electrical))},
+                {"printed_facts", rows_json(torsio::printed_facts(sheet))}};
   return document;
 }
 

@@ -206,6 +206,10 @@ struct SheetRow {
 /// Every number of the sheet, in the order above.
 [[nodiscard]] std::vector<SheetRow> describe(const DataSheet& sheet);
 
+/// What the paper of the actuator prints and the plant does not use: rated speed, mass, size. Empty for a
+/// sheet of another name.
+[[nodiscard]] std::vector<SheetRow> printed_facts(const DataSheet& sheet);
+
 /// The nominal sheets in their default variants.
 [[nodiscard]] std::span<const DataSheet> data_sheets() noexcept;
 

@@ -16,23 +16,18 @@
 
 namespace torsio {
 
-/// What the kernel's numbers theta descend on, sample by sample, while (m, S) takes each sample in:
+/// What the kernel's numbers theta descend on by Adam, sample by sample, while (m, S) takes each sample in:
 ///
-///     paper        (16) = ((y - mu)^2 + Sigma) / (2 sigma^2) + ln sigma^2 / 2; plain gradient steps of
-///                  0.1 from 0.3 (the printed ln 0.3 read as a logarithm), no safeguard: theta_1 can
-///                  only shrink, with some seeds to nothing (specification 3.3). Not as printed:
-///                  theta_4 starts from 0, the variance of the noise from 0.1 of the target's, and
-///                  data are standardised
 ///     nlml         m . K^-1 m / 2 + ln det K / 2 (Raissi); the noise on (16)
-///     elbo         (16) + KL(N(m, S) | N(0, K)) / H, H the number of samples
+///     elbo         (16) = ((y - mu)^2 + Sigma) / (2 sigma^2) + ln sigma^2 / 2, and KL(N(m, S) | N(0, K)) / H,
+///                  H the number of samples
 ///     recommended  elbo; S half way back to K every 1000 samples of the first 80 %, so that learning
 ///                  does not freeze
 ///
-/// All but `paper` by Adam.
-enum class ParametricGpMode : std::uint8_t { paper, nlml, elbo, recommended };
+/// Algorithm 1 of paper 002 is a family of its own: `fit_parametric_gp_paper`.
+enum class ParametricGpMode : std::uint8_t { nlml, elbo, recommended };
 
-inline constexpr std::array<std::string_view, 4> kParametricGpModes{"paper", "nlml", "elbo",
-                                                                    "recommended"};
+inline constexpr std::array<std::string_view, 3> kParametricGpModes{"nlml", "elbo", "recommended"};
 
 /// theta_1 ... theta_9 of the combined kernel (paper 002, equations 9 to 13 as corrected in
 /// specification 1).
@@ -44,7 +39,7 @@ struct ParametricGpOptions {
   std::size_t inducing_points = 14;                ///< M
   std::size_t updates = 20000;                     ///< samples taken in, drawn by chance
   std::size_t batch = 1;        ///< samples between two steps of the kernel's numbers
-  double learning_rate = 0.01;  ///< for Adam; `paper` has its own
+  double learning_rate = 0.01;  ///< for Adam
   bool refit = true;            ///< try the closed form over all samples at the end
   std::optional<PlainKernel> kernel_plain = {};  ///< in place of `kernel`, in physical units, fixed
 
@@ -63,10 +58,8 @@ struct ParametricGpOptions {
                        .minimum = 1,
                        .maximum = 1e6,
                        .help = "samples between two steps of the kernel's numbers"});
-    visit(self.learning_rate, {.name = "learning_rate",
-                               .minimum = 1e-9,
-                               .maximum = 1e3,
-                               .help = "of Adam; not of paper"});
+    visit(self.learning_rate,
+          {.name = "learning_rate", .minimum = 1e-9, .maximum = 1e3, .help = "of Adam"});
     visit(self.refit, {.name = "refit", .help = "try the closed form over all samples at the end"});
     visit(self.kernel_plain, {.name = "kernel_plain",
                               .help = "theta 1 to 9 of paper 002 as plain numbers, joined by /, in "

@@ -3,6 +3,7 @@
 #include "fit/common/fitted_model.hpp"
 #include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "fit/gaussian_process/fit_parametric_gp.hpp"
+#include "fit/gaussian_process/fit_parametric_gp_paper.hpp"
 #include "fit/gaussian_process/kernel_search.hpp"
 
 namespace torsio {
@@ -27,6 +28,11 @@ std::vector<FamilyInfo> gaussian_process_families() {
           {.name = ParametricGp::kFamily,
            .summary = "Gaussian process at a few inducing points, learned sample by sample",
            .describe = describe_kernel<ParametricGp>}),
+      family_of<fit_parametric_gp_paper>(
+          {.name = "parametric_gp_paper",
+           .summary = "the same by Algorithm 1 of paper 002 as printed, for comparison",
+           .model_family = ParametricGp::kFamily,
+           .only_if_named = true}),
       family_of<fit_variational_gp>({.name = "parametric_gp_variational",
                                      .summary = "the same by a variational bound, in closed form",
                                      .model_family = ParametricGp::kFamily})};

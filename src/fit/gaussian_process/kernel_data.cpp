@@ -18,6 +18,7 @@
 namespace torsio {
 namespace {
 
+constexpr std::size_t kMaxClustered = 20000;
 constexpr std::string_view kClustering = "clustering the samples";
 
 double square_distance(std::span<const double> a, std::span<const double> b) {
@@ -169,6 +170,12 @@ Matrix cluster_centres(const Matrix& points, std::size_t clusters, Random& rando
     if (!move_centres(centres, points)) break;
   }
   return centres;
+}
+
+Matrix training_centres(const Table& table, std::size_t clusters, Random& random,
+                        const Progress& progress) {
+  return cluster_centres(thinned(table, kMaxClustered, random).features, clusters, random,
+                         progress);
 }
 
 std::vector<std::string> constant_inputs(const TrainingData& data, const Matrix& features) {

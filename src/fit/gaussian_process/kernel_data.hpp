@@ -42,6 +42,10 @@ void set_start(KernelExpression& kernel, double distance);
 [[nodiscard]] Matrix cluster_centres(const Matrix& points, std::size_t clusters, Random& random,
                                      const Progress& progress = {});
 
+/// The centres of the clusters of the samples, of 20 000 of them at most: more do not move the centres.
+[[nodiscard]] Matrix training_centres(const Table& table, std::size_t clusters, Random& random,
+                                      const Progress& progress);
+
 /// "input support_m is constant in the training data", for each that is.
 [[nodiscard]] std::vector<std::string> constant_inputs(const TrainingData& data,
                                                        const Matrix& features);

@@ -151,6 +151,13 @@ void ParametricGpTrainer::take_in(double target) {
   s_.noalias() -= (g_ / total) * g_.transpose();
 }
 
+void ParametricGpTrainer::take_in_as_printed(double target) {
+  const double share = (target - prediction_.mean) / prediction_.variance;
+  m_ += share * q_;
+  alpha_ += share * a_;
+  s_.noalias() -= (q_ / prediction_.variance) * q_.transpose();
+}
+
 void ParametricGpTrainer::widen() { s_ = 0.5 * (s_ + k_); }
 
 }  // namespace torsio

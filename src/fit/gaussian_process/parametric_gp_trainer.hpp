@@ -49,6 +49,10 @@ class ParametricGpTrainer {
   /// (m, S) after the prepared sample.
   void take_in(double target);
 
+  /// (20) and (21) as paper 002 prints them, q for q^T in (20) and the outer product in (21), without
+  /// which their dimensions differ: m += q (y - mu) / Sigma, S -= q q^T / Sigma.
+  void take_in_as_printed(double target);
+
   /// S half way back to K.
   void widen();
 

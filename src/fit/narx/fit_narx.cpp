@@ -117,7 +117,7 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
     if (!best || rmse < least || !std::isfinite(least)) {
       least = rmse;
       best_round = round;
-      best = FittedModel{model, std::move(f.notes)};
+      best = FittedModel{.model = model, .notes = std::move(f.notes), .table = std::move(f.table)};
     }
     if (round < rounds) outputs = simulated(model, data);
   }

@@ -2,11 +2,13 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "fit/common/fitted_model.hpp"
 #include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "fit/gaussian_process/fit_parametric_gp.hpp"
+#include "fit/gaussian_process/fit_parametric_gp_paper.hpp"
 #include "fit/mixture/fit_dgmm.hpp"
 #include "fit/narx/fit_narx.hpp"
 #include "fit/narx/fit_narx_polynomial.hpp"
@@ -16,6 +18,7 @@
 #include "model/gaussian_process/gaussian_process.hpp"
 #include "model/gaussian_process/parametric_gp.hpp"
 #include "model/mixture/dgmm.hpp"
+#include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
 #include "torsio/core/error.hpp"
 
@@ -66,10 +69,17 @@ ParameterDescription describe_equation(const AnyParameters& parameters,
                                 settings.features.inputs, settings.target)}};
 }
 
+/// @param variations what a structure search tries; empty: it leaves the family out
 template <class M, auto kFit>
-FamilyInfo narx_family(std::string_view summary, std::string_view name = Narx<M>::kFamily) {
-  return family_of<narx<M, kFit>>(
-      {.name = name, .summary = summary, .model_family = Narx<M>::kFamily, .only_if_named = true});
+FamilyInfo narx_family(std::string_view summary, std::string_view name = Narx<M>::kFamily,
+                       std::vector<OptionVariation> variations = {}) {
+  const bool in_search = !variations.empty();
+  return family_of<narx<M, kFit>>({.name = name,
+                                   .summary = summary,
+                                   .model_family = Narx<M>::kFamily,
+                                   .only_if_named = true,
+                                   .in_search = in_search,
+                                   .variations = std::move(variations)});
 }
 
 }  // namespace
@@ -92,10 +102,21 @@ std::vector<FamilyInfo> narx_families() {
           narx_family<Dgmm, fit_dgmm>("Gaussian mixture that hears its own past output"),
           narx_family<Mlp, fit_members<fit_mlp, fit_mlp_ensemble, MlpOptions>>(
               "neural network that hears its own past output"),
+          narx_family<Lstm, fit_members<fit_lstm, fit_lstm_ensemble, RecurrentOptions>>(
+              "LSTM that hears its own past output"),
           narx_family<GaussianProcess, fit_gaussian_process>(
               "exact Gaussian process that hears its own past output"),
           narx_family<ParametricGp, fit_parametric_gp>(
-              "Gaussian process at a few inducing points that hears its own past output"),
+              "Gaussian process at a few inducing points that hears its own past output",
+              Narx<ParametricGp>::kFamily,
+              // What paper 002 chose by trial in section III-C: clusters and lags, one at a time.
+              {{"inducing_points", "7"},
+               {"inducing_points", "28"},
+               {"input_lags", "7"},
+               {"output_lags", "7"}}),
+          narx_family<ParametricGp, fit_parametric_gp_paper>(
+              "the same by Algorithm 1 of paper 002 as printed, for comparison",
+              "narx_parametric_gp_paper"),
           narx_family<ParametricGp, fit_variational_gp>(
               "the same by a variational bound, in closed form", "narx_parametric_gp_variational")};
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "fit/gaussian_process/gp_descent.hpp"
 #include "fit/gaussian_process/marginal_likelihood.hpp"
 #include "fit/gaussian_process/parametric_gp_trainer.hpp"
 #include "fit/gaussian_process/sparse_posterior.hpp"
@@ -263,6 +265,108 @@ TEST(ParametricGpTrainer, SampleBySampleItIsFitc) {
                 .cwiseAbs()
                 .maxCoeff(),
             1e-10);
+}
+
+/// theta from what a combined kernel stores, in the order of the storage: 1 / l of the linear one.
+std::vector<double> theta_of(const Kernel& kernel) {
+  std::vector<double> theta;
+  const std::vector<ThetaForm> forms = theta_forms(kernel.expression());
+  const std::vector<double> numbers = kernel.log_parameters();
+  for (std::size_t p = 0; p < forms.size(); ++p)
+    theta.push_back(forms[p] == ThetaForm::offset              ? numbers[p]
+                    : forms[p] == ThetaForm::inverse_logarithm ? std::exp(-numbers[p])
+                                                               : std::exp(numbers[p]));
+  return theta;
+}
+
+TEST(GpDescent, APlainStepFollowsTheGradientByThetaOrByItsLogarithm) {
+  constexpr double kRate = 1e-3;
+  const Trained t;
+  // Before anything is learned the gradient is not small.
+  const ParametricGpTrainer start(some_kernel(), t.points, 0.05);
+  Table one{.features = Matrix(1, kInputs), .target = {t.target[0]}};
+  std::ranges::copy(t.features.row(0), one.features.values.begin());
+  const std::vector<double> theta = theta_of(start.kernel());
+  const std::vector<ThetaForm> forms = theta_forms(start.kernel().expression());
+  ASSERT_EQ(forms.size(), 8U) << "two of the nine theta are one, since theta_1 has no place here";
+  const auto objective = [&](const std::vector<double>& of) {
+    ParametricGpTrainer other = start;
+    std::vector<double> numbers;
+    for (std::size_t p = 0; p < of.size(); ++p)
+      numbers.push_back(forms[p] == ThetaForm::offset              ? of[p]
+                        : forms[p] == ThetaForm::inverse_logarithm ? -std::log(of[p])
+                                                                   : std::log(of[p]));
+    numbers.push_back(std::log(0.05));
+    EXPECT_TRUE(other.set_parameters(numbers));
+    const auto [mean, variance] = other.predict(one.features.row(0));
+    const double error = one.target[0] - mean;
+    return (error * error + variance) / 0.1;
+  };
+  for (const ThetaStep step : {ThetaStep::plain, ThetaStep::logarithm}) {
+    GpDescent descent{start};
+    Random random(1);
+    descend(descent, one, {.step = step, .rate = kRate, .updates = 1}, random, {});
+    EXPECT_EQ(descent.updates, 1U);
+    const std::vector<double> moved = theta_of(descent.trainer.kernel());
+    for (std::size_t p = 0; p < theta.size(); ++p) {
+      std::vector<double> more = theta;
+      std::vector<double> less = theta;
+      more[p] += 1e-5;
+      less[p] -= 1e-5;
+      const double slope = (objective(more) - objective(less)) / 2e-5;
+      const double expected = step == ThetaStep::plain
+                                  ? theta[p] - kRate * slope
+                                  : theta[p] * std::exp(-kRate * slope * theta[p]);
+      EXPECT_NEAR(moved[p], expected, 1e-6 * (1.0 + std::abs(theta[p]))) << "number " << p;
+    }
+  }
+}
+
+// theta_8 below 0: the step follows the gradient by theta itself, and ends where its sign would change.
+TEST(GpDescent, APlainStepKeepsTheSignOfTheta8OrEnds) {
+  constexpr double kAlpha = -2.0;
+  KernelExpression expression = parse_kernel("rq", 1);
+  expression.nodes[0].shape = kAlpha;
+  Matrix points(2, 1);
+  points.values = {-0.3, 0.4};
+  const ParametricGpTrainer start(Kernel(expression, 1), points, 0.05);
+  Table one{.features = Matrix(1, 1), .target = {0.8}};
+  one.features.values = {0.9};
+  const auto shape_after = [&](double rate, std::string& end) {
+    GpDescent descent{start};
+    Random random(1);
+    descend(descent, one, {.step = ThetaStep::plain, .rate = rate, .updates = 1}, random, {});
+    end = descent.end;
+    return descent.trainer.kernel().expression().nodes[0].shape;
+  };
+  std::string end;
+  const double slope = (shape_after(1e-4, end) - kAlpha) / -1e-4;
+  EXPECT_TRUE(end.empty());
+  EXPECT_NE(slope, 0.0);
+  const double across =
+      1.5 * std::abs(kAlpha / slope);  // a rate that leads across 0, or away from it
+  const double moved = shape_after(across, end);
+  if (slope < 0.0) {
+    EXPECT_FALSE(end.empty());
+    EXPECT_EQ(moved, kAlpha);
+  } else {
+    EXPECT_TRUE(end.empty());
+    EXPECT_NEAR(moved, kAlpha - across * slope, 1e-3);
+  }
+}
+
+TEST(ParametricGpTrainer, ThePrintedMomentsAreEquations20And21) {
+  const Trained t;
+  ParametricGpTrainer trainer = t.trainer;
+  const auto [mean, variance] = trainer.predict(t.features.row(0));
+  const MatrixXd q = covariance(trainer.kernel(), t.points, t.features).col(0);
+  const VectorXd m = trainer.mean() + q * (t.target[0] - mean) / variance;
+  const MatrixXd s = trainer.covariance() - q * q.transpose() / variance;
+  trainer.take_in_as_printed(t.target[0]);
+  EXPECT_LT((trainer.mean() - m).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((trainer.covariance() - s).cwiseAbs().maxCoeff(), 1e-12);
+  const double again = trainer.predict(t.features.row(0)).mean;
+  EXPECT_NEAR(again, q.col(0).dot(trainer.prior().llt().solve(m)), 1e-9);
 }
 
 TEST(ParametricGpTrainer, TakesBackNumbersThatHaveNoKernel) {

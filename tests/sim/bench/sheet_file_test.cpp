@@ -134,7 +134,8 @@ TEST(SheetFile, RefusesWrongValuesWithTheirPlace) {
   expect(with_line(sheet, "variant:", "variant: maxwell"), {"maxwell-slip"});
   expect(with_line(sheet, "title:", "title: \"a\\nb\""), {"in one line"});
   expect(sheet + "serial: 10000\n", {"0 to 9999"});
-  expect(data_sheet_yaml(data_sheet("rubber-clutch")) + "variant: stiff\n", {"no variant"});
+  expect(with_line(data_sheet_yaml(data_sheet("rubber-clutch")), "variant:", "variant: stiff"),
+         {"measured", "designed", "no-clutch"});
   expect("name: x\n", {"'family' is missing"});
   expect("- 1\n", {"keys with values"});
 }

@@ -53,6 +53,12 @@ inline Narx<Mlp> example<Narx<Mlp>>() {
       random_network<Mlp>({.inputs = 5, .hidden = {6}, .activation = Activation::tanh}, 8), 1, 1);
 }
 template <>
+inline Narx<Lstm> example<Narx<Lstm>>() {
+  return example_narx<Lstm>(
+      random_network<Lstm>({.inputs = 5, .units = {4}, .hidden = {}, .warm_up_samples = 3}, 9), 1,
+      1);
+}
+template <>
 inline Narx<GaussianProcess> example<Narx<GaussianProcess>>() {
   return example_narx<GaussianProcess>(example_gaussian_process(3), 0, 1);
 }
