@@ -4,202 +4,127 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <vector>
 
+#include "drive_stages.hpp"
 #include "published.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
-#include "torsio/evaluate/comparison.hpp"
-#include "torsio/evaluate/cross_validation.hpp"
-#include "torsio/sim/experiments/experiment.hpp"
+#include "torsio/actuator/data_sheet.hpp"
 
 namespace torsio {
 namespace {
 
-// The paper's encoder sets (specification 3.4): the twist of the tube, the torque asked of the
-// motor, the joint's acceleration; the third one looks through tube and gear together.
-constexpr const char* kTwist = "motor_angle_rad / 2 - wave_generator_angle_rad";
-constexpr const char* kTwistThroughGear =
-    "lowpass(motor_angle_rad / 2 - 51 * joint_angle_rad, 10Hz)";
-constexpr const char* kMotorTorque = "motor_torque_Nm";
-constexpr const char* kAcceleration = "lowpass(rate(rate(joint_angle_rad)), 3Hz)";
-constexpr const char* kTwistRate =
-    "lowpass(rate(motor_angle_rad / 2 - wave_generator_angle_rad), 10Hz)";
-constexpr const char* kGeneratorSpeed = "lowpass(rate(wave_generator_angle_rad), 10Hz)";
+constexpr const char* kDrive = "harmonic-drive";
 
-using InputSet = std::pair<std::string, std::vector<std::string>>;
-const InputSet kSet1{"I", {kTwist, kMotorTorque, kAcceleration}};
-const InputSet kSet2{"II", {kTwist, kMotorTorque}};
-const InputSet kSet2Plus{"II+", {kTwist, kMotorTorque, kGeneratorSpeed}};
-const InputSet kSet3{"III", {kTwistThroughGear, kMotorTorque}};
+constexpr const char* kStagesText =
+    "in the five stages of the paper: collection (five recordings of pushes of 10 to 20 Nm), "
+    "Shapley values, offline "
+    "training, online training of the last layer on a recording of 15 Nm, validation on others; "
+    "the Shapley values "
+    "are those of the first repeat";
 
-/// The paper's network and training on each input set (Table 2; stride, burn-in, learning rate and
-/// clipping are assumed), compared with simple models: linear, a static
-/// network, and linear with friction, which has the twist's rate in addition to set II.
-std::vector<ModelChoice> choices_of(const Dataset& dataset, const StudyOptions& options) {
-  const std::string models = fmt::format(
-      "linear,mlp,lstm:layers={}:window=200:stride=20:burn_in=20:epochs=3:batch=64:"
-      "learning_rate=0.001:clip=1:patience=0",
-      options.is_quick ? 32 : 250);
-  std::vector<ModelChoice> choices = model_choices(dataset, models, {});
-  if (dataset.input_sets.front() == kSet2Plus) return choices;  // is compared with II already
-  const std::vector<std::string> with_rate{kTwist, kMotorTorque, kTwistRate};
-  for (ModelChoice& choice : model_choices(dataset, "linear_coulomb", with_rate))
-    choices.insert(choices.begin(), std::move(choice));
-  return choices;
+Study study_of(std::string_view what, const StudyOptions& options) {
+  return {.protocol = fmt::format("{}, {}", what, kStagesText),
+          .unit = "Nm",
+          .options = options,
+          .plants = {study_plant(kDrive)},
+          .figure_columns = 2};
 }
 
-/// A hand that pushes the output to and fro against the impedance controller.
-struct Push {
-  std::string actuator = "harmonic-drive";
-  double torque_Nm = 20.0;
-  bool is_impedance_zero = false;
-  std::string condition = {};     ///< what a row of the table is called by
-  std::uint64_t seed_offset = 0;  ///< the same recording in every comparison of a repeat
-  Role role = Role::train;
-};
-
-struct PushData {
-  Dataset dataset;
-  StudyConditions conditions;
-};
-
-/// 150 s each, assumed: the paper prints no duration.
-PushData record(const std::vector<Push>& pushes, const StudyOptions& options, std::uint64_t seed,
-                const Progress& progress) {
-  PushData data;
-  for (const Push& push : pushes) {
-    Recording recording = simulate({.actuator = push.actuator,
-                                    .experiment = "human-torque",
-                                    .seed = seed + push.seed_offset,
-                                    .duration_s = options.is_quick ? 60.0 : 150.0,
-                                    .torque_amplitude_Nm = push.torque_Nm,
-                                    .is_impedance_zero = push.is_impedance_zero},
-                                   progress);
-    data.conditions.add(recording.name(), push.condition);
-    const std::size_t samples = recording.size();
-    data.dataset.records.push_back({std::move(recording), whole_record(samples, push.role)});
-  }
-  return data;
-}
-
-/// Five recordings, each held out once.
-void cross_validate_into(StudyRows& rows, const Push& push, const std::vector<InputSet>& sets,
-                         const StudyOptions& options, std::uint64_t seed,
-                         const Progress& progress) {
-  constexpr std::size_t kFolds = 5;
-  std::vector<Push> pushes(kFolds, push);
-  for (std::size_t k = 0; k < kFolds; ++k) pushes[k].seed_offset = k;
-  PushData data = record(pushes, options, seed, progress);
-  data.dataset.input_sets = sets;
-  const auto choices = choices_of(data.dataset, options);
-  const CrossValidation validation =
-      cross_validate(data.dataset, choices, {.folds = kFolds}, seed, false, progress);
-  rows.add(validation.results, data.dataset, Role::validation,
-           [&](const std::string&) { return push.condition; });
-}
-
-void compare_into(StudyRows& rows, const std::vector<Push>& pushes, const InputSet& set,
-                  const StudyOptions& options, std::uint64_t seed, const Progress& progress) {
-  PushData data = record(pushes, options, seed, progress);
-  data.dataset.input_sets = {set};
-  const auto choices = choices_of(data.dataset, options);
-  const Results results = compare(data.dataset, choices, seed, false, progress).results;
-  rows.add(results, data.dataset, Role::test,
-           [&](const std::string& recording) { return data.conditions.of(recording); });
-}
-
-std::vector<Push> five_between(double low_Nm, double high_Nm, bool is_impedance_zero) {
-  std::vector<Push> pushes(5);
-  for (std::size_t k = 0; k < pushes.size(); ++k) {
-    pushes[k].torque_Nm = low_Nm + 0.25 * static_cast<double>(k) * (high_Nm - low_Nm);
-    pushes[k].is_impedance_zero = is_impedance_zero;
-    pushes[k].seed_offset = k + (is_impedance_zero ? 10U : 0U);
-  }
-  return pushes;
+/// One push under high impedance, like those of the training but for its seed.
+Push validation_push(double torque_Nm, std::string condition, std::size_t n) {
+  return {
+      .torque_Nm = torque_Nm, .condition = std::move(condition), .seed_offset = kFirstTestSeed + n};
 }
 
 }  // namespace
 
 Study encoders_004(const StudyOptions& options, const Progress& progress) {
-  Study study{.protocol =
-                  "stiff tube, high impedance, pushes of 20 Nm: five recordings, each held "
-                  "out once; inputs I tube twist, motor torque, joint acceleration, II "
-                  "without the acceleration, III twist of tube and gear, motor torque",
-              .unit = "Nm",
-              .options = options,
-              .plants = {study_plant("harmonic-drive")}};
+  Study study = study_of(
+      "stiff tube, high impedance; inputs I tube twist, motor torque, joint acceleration, II "
+      "without the "
+      "acceleration, III twist of tube and gear, motor torque; the first repeat also with each "
+      "recording held out once",
+      options);
   StudyRows rows(kPublishedEncoders);
   for (std::size_t k = 0; k < options.repeats; ++k)
-    cross_validate_into(rows, {.condition = "20 Nm"}, {kSet1, kSet2, kSet3}, options,
-                        repeat_seed(options, k),
-                        nth_of(progress, k, options.repeats, "encoder sets"));
+    run_stages(study, rows,
+               {.sheet = data_sheet(kDrive),
+                .collected = collected_pushes(false),
+                .online = {online_push(false)},
+                .validated = {validation_push(20.0, "20 Nm", 0)},
+                .sets = {drive_inputs("I"), drive_inputs("II"), drive_inputs("III")},
+                .figure = "Figures 9 and 10",
+                .has_folds = true},
+               repeat_seed(options, k), k == 0,
+               nth_of(progress, k, options.repeats, "encoder sets"));
   study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 
 Study torque_levels_004(const StudyOptions& options, const Progress& progress) {
-  Study study{.protocol =
-                  "stiff tube, high impedance: trained on pushes of 10 to 20 Nm, tested on "
-                  "others; inputs II",
-              .unit = "Nm",
-              .options = options,
-              .plants = {study_plant("harmonic-drive")}};
+  Study study = study_of(
+      "stiff tube, high impedance, tested on pushes of 5 to 50 Nm; inputs II; \"alone\": without "
+      "the guards, which "
+      "replace a network outside its range by a linear model",
+      options);
   constexpr std::array kLevels_Nm{5.0, 20.0, 30.0, 40.0, 50.0};
+  std::vector<Push> levels;
+  for (const double level_Nm : kLevels_Nm)
+    // NOLINTNEXTLINE(performance-inefficient-vector-operation): five of them
+    levels.push_back(validation_push(level_Nm, fmt::format("{:g} Nm", level_Nm), levels.size()));
   StudyRows rows(kPublishedTorqueLevels);
-  for (std::size_t k = 0; k < options.repeats; ++k) {
-    std::vector<Push> pushes = five_between(10.0, 20.0, false);
-    for (const double level_Nm : kLevels_Nm)
-      pushes.push_back({.torque_Nm = level_Nm,
-                        .condition = fmt::format("{:g} Nm", level_Nm),
-                        .seed_offset = kFirstTestSeed + pushes.size(),
-                        .role = Role::test});
-    compare_into(rows, pushes, kSet2, options, repeat_seed(options, k),
-                 nth_of(progress, k, options.repeats, "torque levels"));
-  }
+  for (std::size_t k = 0; k < options.repeats; ++k)
+    run_stages(study, rows,
+               {.sheet = data_sheet(kDrive),
+                .collected = collected_pushes(false),
+                .online = {online_push(false)},
+                .validated = levels,
+                .sets = {drive_inputs("II")},
+                .figure = "Figure 11",
+                .runs_without_guards = true},
+               repeat_seed(options, k), k == 0,
+               nth_of(progress, k, options.repeats, "torque levels"));
   study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 
 Study impedances_004(const StudyOptions& options, const Progress& progress) {
-  Study study{.protocol =
-                  "stiff tube, pushes of 10 to 20 Nm: trained under high, zero or both "
-                  "impedances, tested on pushes of 15 Nm; inputs II, and II+ with the speed "
-                  "of the wave generator where both are trained on",
-              .unit = "Nm",
-              .options = options,
-              .plants = {study_plant("harmonic-drive")}};
+  Study study = study_of(
+      "stiff tube: trained under high, zero or both impedances, tested on pushes of 15 Nm; inputs "
+      "II, and II+ with "
+      "the speed of the wave generator where both are trained on",
+      options);
   struct Case {
     const char* name;
-    bool has_high;
-    bool has_zero;
-    InputSet set;
+    std::vector<bool> modes;  ///< whether the impedance is zero
+    std::vector<InputSet> sets;
   };
-  const std::vector<Case> cases{{"high", true, false, kSet2},
-                                {"zero", false, true, kSet2},
-                                {"both", true, true, kSet2},
-                                {"both", true, true, kSet2Plus}};
+  const std::array cases{Case{"high", {false}, {drive_inputs("II")}},
+                         Case{"zero", {true}, {drive_inputs("II")}},
+                         Case{"both", {false, true}, {drive_inputs("II"), drive_inputs("II+")}}};
   StudyRows rows(kPublishedImpedances);
   for (std::size_t k = 0; k < options.repeats; ++k) {
     for (std::size_t c = 0; c < cases.size(); ++c) {
       const Case& of = cases[c];
-      std::vector<Push> pushes;
-      if (of.has_high) pushes = five_between(10.0, 20.0, false);
-      if (of.has_zero) {
-        const std::vector<Push> zero = five_between(10.0, 20.0, true);
-        pushes.insert(pushes.end(), zero.begin(), zero.end());
+      DriveStages stages{
+          .sheet = data_sheet(kDrive), .name = fmt::format("trained {}", of.name), .sets = of.sets};
+      for (const bool is_zero : of.modes) {
+        for (const Push& push : collected_pushes(is_zero)) stages.collected.push_back(push);
+        stages.online.push_back(online_push(is_zero));
       }
-      for (const bool is_zero : {false, true})
-        pushes.push_back(
-            {.torque_Nm = 15.0,
-             .is_impedance_zero = is_zero,
-             .condition = fmt::format("trained {}, tested {}", of.name, is_zero ? "zero" : "high"),
-             .seed_offset = kFirstTestSeed + (is_zero ? 1 : 0),
-             .role = Role::test});
-      compare_into(rows, pushes, of.set, options, repeat_seed(options, k),
-                   nth_of(progress, k * cases.size() + c, options.repeats * cases.size(),
-                          fmt::format("impedance {}", of.name)));
+      for (const bool is_zero : {false, true}) {
+        stages.validated.push_back(validation_push(
+            15.0, fmt::format("trained {}, tested {}", of.name, is_zero ? "zero" : "high"),
+            is_zero ? 1 : 0));
+        stages.validated.back().is_impedance_zero = is_zero;
+      }
+      if (of.modes.size() == 2) stages.figure = "Figure 12";
+      run_stages(study, rows, stages, repeat_seed(options, k), k == 0,
+                 nth_of(progress, k * cases.size() + c, options.repeats * cases.size(),
+                        fmt::format("impedance {}", of.name)));
     }
   }
   study.table = ErrorTable{.rows = rows.errors()};
@@ -207,22 +132,28 @@ Study impedances_004(const StudyOptions& options, const Progress& progress) {
 }
 
 Study tubes_004(const StudyOptions& options, const Progress& progress) {
-  Study study{.protocol =
-                  "high impedance, pushes of 20 Nm, three tubes: five recordings each, each "
-                  "held out once; inputs II, with the rigid tube III, whose twist it can "
-                  "not measure",
-              .unit = "Nm",
-              .options = options};
+  Study study = study_of(
+      "high impedance, three tubes; inputs II, with the rigid tube III, whose twist it cannot "
+      "measure",
+      options);
+  study.plants.clear();
   constexpr std::array kTubes{"soft", "stiff", "rigid"};
   StudyRows rows(kPublishedTubes);
   for (std::size_t t = 0; t < kTubes.size(); ++t) {
-    const std::string actuator = std::string("harmonic-drive:") + kTubes[t];
+    const std::string actuator = fmt::format("{}:{}", kDrive, kTubes[t]);
     study.plants.push_back(study_plant(actuator));
-    const InputSet& set = kTubes[t] == std::string_view("rigid") ? kSet3 : kSet2;
+    const bool is_rigid = kTubes[t] == std::string_view("rigid");
     for (std::size_t k = 0; k < options.repeats; ++k)
-      cross_validate_into(
-          rows, {.actuator = actuator, .condition = kTubes[t]}, {set}, options,
-          repeat_seed(options, k),
+      run_stages(
+          study, rows,
+          {.sheet = data_sheet(actuator),
+           .name = fmt::format("{} tube", kTubes[t]),
+           .collected = collected_pushes(false),
+           .online = {online_push(false)},
+           .validated = {validation_push(20.0, kTubes[t], 0)},
+           .sets = {drive_inputs(is_rigid ? "III" : "II")},
+           .figure = fmt::format("Figures 14 and 15, {} tube", kTubes[t])},
+          repeat_seed(options, k), k == 0,
           nth_of(progress, t * options.repeats + k, kTubes.size() * options.repeats, kTubes[t]));
   }
   study.table = ErrorTable{.rows = rows.errors()};

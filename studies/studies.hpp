@@ -39,6 +39,7 @@ Study encoders_004(const StudyOptions& options, const Progress& progress);
 Study torque_levels_004(const StudyOptions& options, const Progress& progress);
 Study impedances_004(const StudyOptions& options, const Progress& progress);
 Study tubes_004(const StudyOptions& options, const Progress& progress);
+Study sensitivity_004(const StudyOptions& options, const Progress& progress);
 Study arm_external(const StudyOptions& options, const Progress& progress);
 Study arm_contacts(const StudyOptions& options, const Progress& progress);
 Study arm_collision(const StudyOptions& options, const Progress& progress);

@@ -176,8 +176,9 @@ struct StudyInfo {
   Study (*run)(const StudyOptions& options, const Progress& progress);
   double minutes = 0.0;                        ///< about how long the default takes on two cores
   std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
-  bool must_be_named = false;  ///< needs recordings (TORSIO_DATA or ../shared/data) or a solver
-  bool has_figures = false;    ///< `Study::figures` are set
+  bool must_be_named =
+      false;  ///< takes long, or needs recordings (TORSIO_DATA or ../shared/data) or a solver
+  bool has_figures = false;  ///< `Study::figures` are set
 };
 
 /// Deterministic for the options. @throws UsageError unless there are 1 to 100 repeats; Cancelled;

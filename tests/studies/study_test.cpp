@@ -77,7 +77,8 @@ TEST(Studies, OfSpringModelsScoreEveryModelOnTheNewSweep) {
 // torque is at most 1.45 times the level, with noise: each period has an amplitude within 3 * 15 %.
 TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
   const Study study = run_study(find_study("004-torque"), kQuick);
-  for (const char* model : {"linear_coulomb", "linear, II", "mlp, II", "lstm 32, II"}) {
+  for (const char* model : {"linear_coulomb", "linear, II", "mlp, II", "lstm 32, II",
+                            "lstm 32, II, online", "lstm 32, II, online, alone"}) {
     double before_Nm = 0.0;
     for (const double level_Nm : {20.0, 30.0, 40.0, 50.0}) {
       const ErrorRow& row = row_of(study, fmt::format("{:g} Nm", level_Nm), model);
@@ -87,12 +88,50 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
       before_Nm = row.rmse;
     }
   }
+  // At 5 Nm no guard replaces the network; far beyond the trained torques one does.
+  const ErrorRow& guarded = row_of(study, "50 Nm", "lstm 32, II, online");
+  EXPECT_EQ(row_of(study, "5 Nm", "lstm 32, II, online").rmse,
+            row_of(study, "5 Nm", "lstm 32, II, online, alone").rmse);
+  EXPECT_GT(guarded.guarded_percent, 10.0);
+  EXPECT_EQ(row_of(study, "50 Nm", "lstm 32, II, online, alone").guarded_percent, 0.0);
+  EXPECT_NE(guarded.rmse, row_of(study, "50 Nm", "lstm 32, II, online, alone").rmse);
   const Study again = run_study(find_study("004-torque"), kQuick);
   const std::vector<ErrorRow>& first = std::get<ErrorTable>(study.table).rows;
   const std::vector<ErrorRow>& second = std::get<ErrorTable>(again.table).rows;
   ASSERT_EQ(second.size(), first.size());
   for (std::size_t i = 0; i < first.size(); ++i)
     EXPECT_EQ(second[i].rmse, first[i].rmse) << first[i].model;
+}
+
+// Paper 004, Figure 7: each stage leaves something in the study.
+TEST(Studies, OfEncodersHaveTheFiveStagesOfThePaper) {
+  const Study study = run_study(find_study("004-encoders"), kQuick);
+  for (const char* set : {"I", "II", "III"}) {
+    const std::string network = fmt::format("lstm 32, {}", set);
+    EXPECT_EQ(row_of(study, "stage 3, held-out folds", network).runs, 5U);
+    EXPECT_EQ(row_of(study, "20 Nm", network).runs, 1U);
+    EXPECT_NE(row_of(study, "20 Nm", network + ", online").rmse,
+              row_of(study, "20 Nm", network).rmse);
+    EXPECT_THAT(study.notes,
+                testing::Contains(testing::StartsWith("stage 3, the same in " + network + ": ")));
+    EXPECT_THAT(study.notes, testing::Contains(testing::AllOf(
+                                 testing::StartsWith(fmt::format("stage 4, {}: ", network)),
+                                 testing::Not(testing::HasSubstr(": 0 updates")))));
+  }
+  EXPECT_THAT(study.notes, testing::Contains(testing::StartsWith("stage 2, ")));
+  EXPECT_EQ(study.figures.size(), 6U);  // a trace and a loop of each set
+}
+
+TEST(Studies, OfSensitivityMarkTheCombinationsThatHaveThePapersOrder) {
+  const Study study = run_study(find_study("004-sensitivity"), kQuick);
+  const auto& rows = std::get<QuantityTable>(study.table).rows;
+  ASSERT_EQ(rows.size(), 8U);  // four of each of two combinations
+  for (std::size_t i = 0; i < rows.size(); i += 4) {
+    const bool has_order = rows[i + 1].value < rows[i].value && rows[i].value < rows[i + 2].value;
+    EXPECT_EQ(!rows[i + 2].remark.empty(), has_order) << rows[i].condition;
+    EXPECT_GT(rows[i + 3].value, 0.0);
+  }
+  EXPECT_NE(rows[2].value, rows[6].value);  // 13 and 17 bit
 }
 
 TEST(Studies, OfTheElastomerCouplingHaveTheFitsOfThePrototype) {

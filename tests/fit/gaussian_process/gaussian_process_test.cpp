@@ -323,36 +323,47 @@ TEST(GpDescent, APlainStepFollowsTheGradientByThetaOrByItsLogarithm) {
 }
 
 // theta_8 below 0: the step follows the gradient by theta itself, and ends where its sign would change.
-TEST(GpDescent, APlainStepKeepsTheSignOfTheta8OrEnds) {
-  constexpr double kAlpha = -2.0;
+constexpr double kShape = -2.0;
+
+/// theta_8 after one plain step on one sample, and why the descent ended.
+std::pair<double, std::string> shape_after(double target, double rate) {
   KernelExpression expression = parse_kernel("rq", 1);
-  expression.nodes[0].shape = kAlpha;
+  expression.nodes[0].shape = kShape;
   Matrix points(2, 1);
   points.values = {-0.3, 0.4};
-  const ParametricGpTrainer start(Kernel(expression, 1), points, 0.05);
-  Table one{.features = Matrix(1, 1), .target = {0.8}};
+  Table one{.features = Matrix(1, 1), .target = {target}};
   one.features.values = {0.9};
-  const auto shape_after = [&](double rate, std::string& end) {
-    GpDescent descent{start};
-    Random random(1);
-    descend(descent, one, {.step = ThetaStep::plain, .rate = rate, .updates = 1}, random, {});
-    end = descent.end;
-    return descent.trainer.kernel().expression().nodes[0].shape;
-  };
-  std::string end;
-  const double slope = (shape_after(1e-4, end) - kAlpha) / -1e-4;
-  EXPECT_TRUE(end.empty());
-  EXPECT_NE(slope, 0.0);
-  const double across =
-      1.5 * std::abs(kAlpha / slope);  // a rate that leads across 0, or away from it
-  const double moved = shape_after(across, end);
-  if (slope < 0.0) {
-    EXPECT_FALSE(end.empty());
-    EXPECT_EQ(moved, kAlpha);
-  } else {
+  GpDescent descent{ParametricGpTrainer(Kernel(expression, 1), points, 0.05)};
+  // While the mean is 0, the slope does not depend on the target.
+  static_cast<void>(descent.trainer.predict(one.features.row(0)));
+  descent.trainer.take_in(1.0);
+  Random random(1);
+  descend(
+      descent, one,
+      {.objective = KernelObjective::sample, .step = ThetaStep::plain, .rate = rate, .updates = 1},
+      random, {});
+  return {descent.trainer.kernel().expression().nodes[0].shape, descent.end};
+}
+
+TEST(GpDescent, APlainStepKeepsTheSignOfTheta8OrEnds) {
+  const auto slope_of = [](double target) {
+    const auto [shape, end] = shape_after(target, 1e-4);
     EXPECT_TRUE(end.empty());
-    EXPECT_NEAR(moved, kAlpha - across * slope, 1e-3);
-  }
+    return (shape - kShape) / -1e-4;
+  };
+  constexpr double kTowardsZero = 3.0;
+  constexpr double kAwayFromZero = -3.0;
+  const double towards = slope_of(kTowardsZero);
+  const double away = slope_of(kAwayFromZero);
+  ASSERT_LT(towards, 0.0);
+  ASSERT_GT(away, 0.0);
+  const auto [kept, end] = shape_after(kTowardsZero, 1.5 * kShape / towards);
+  EXPECT_FALSE(end.empty());
+  EXPECT_EQ(kept, kShape);
+  constexpr double kRate = 3e-4;
+  const auto [moved, no_end] = shape_after(kAwayFromZero, kRate);
+  EXPECT_TRUE(no_end.empty());
+  EXPECT_NEAR(moved, kShape - kRate * away, 1e-3 * kRate * away);
 }
 
 TEST(ParametricGpTrainer, ThePrintedMomentsAreEquations20And21) {
