@@ -1,2 +1,0 @@
-cd .; g++ -std=c++20 -O1 -w -c -DTORSIO_CC='"gcc"' -DTORSIO_NM='"nm"' -I../../include -I../../src -I../../tests -isystem /usr/include/eigen3 ../../tests/export/c99_test.cpp -o ./t_c99.ot 2>&1 | head -20
-B=../../build/src; g++ -o t_c99 t_c99.ot $(ls *.o | grep -v driver) -Wl,--allow-multiple-definition -Wl,--start-group $B/libtorsio_learn.a $B/libtorsio_data.a $B/libtorsio_files.a $B/libtorsio_runtime.a $B/libtorsio_realtime.a -Wl,--end-group -lgtest -lgtest_main -lgmock -lfmt -lhwy -lyaml-cpp -lz -lzstd -llz4 -lbz2 -lsqlite3 -lcrypto -ldl -lpthread 2>&1 | head -5
