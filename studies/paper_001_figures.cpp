@@ -144,12 +144,10 @@ void add_models(Study& study, QuantityTable& table, const Progress& progress) {
 }
 
 /// The chirp of a reference takes 100 s; this one has the same band over the whole figure.
-TorqueReference chirp_reference(double duration_s) {
-  Chirp::Parameters parameters = kChirp;
-  parameters.duration_s = duration_s;
+TorqueReference chirp_reference(const Chirp::Parameters& parameters) {
   Chirp chirp(parameters, kBenchRate_Hz);
   TorqueReference reference{.kind = TorqueReference::Kind::replay};
-  for (std::size_t n = 0; n < static_cast<std::size_t>(duration_s * kBenchRate_Hz); ++n)
+  for (std::size_t n = 0; n < static_cast<std::size_t>(parameters.duration_s * kBenchRate_Hz); ++n)
     reference.recorded_Nm.push_back(chirp.step());
   return reference;
 }
@@ -188,9 +186,7 @@ std::vector<std::vector<double>> run_references(Study& study, QuantityTable& tab
 
 /// The chirp's errors over its frequency.
 void add_bands(Study& study, QuantityTable& table,
-               const std::vector<std::vector<double>>& errors_Nm, double duration_s) {
-  Chirp::Parameters chirp = kChirp;
-  chirp.duration_s = duration_s;
+               const std::vector<std::vector<double>>& errors_Nm, const Chirp::Parameters& chirp) {
   XyFigure figure{.title = "Figure 6: error over frequency",
                   .x = {"frequency [Hz]"},
                   .y = {"RMS of the error [Nm]"},
@@ -216,7 +212,8 @@ void add_bands(Study& study, QuantityTable& table,
 void add_tracking(Study& study, QuantityTable& table, const Progress& progress) {
   const StudyOptions& options = study.options;
   constexpr double kQuick_s = 20.0;
-  const double duration_s = options.is_quick ? kQuick_s : kTrace_s;
+  Chirp::Parameters chirp = kChirp;
+  if (options.is_quick) chirp.duration_s = kQuick_s;
   Dataset dataset = sweep_dataset(kLearned, options.seed, progress);
   add_torque_mode(dataset,
                   {.actuator = kLearned,
@@ -226,14 +223,14 @@ void add_tracking(Study& study, QuantityTable& table, const Progress& progress) 
   std::vector<AnyInverse> inverses;
   for (const LoopFamily& family : kTrackingFamilies)
     inverses.push_back(learned_inverse(family, dataset, options.seed));
-  const auto errors_Nm = run_references(study, table, chirp_reference(duration_s), "chirp",
-                                        inverses, kPrintedChirp, progress);
+  const auto errors_Nm = run_references(study, table, chirp_reference(chirp), "chirp", inverses,
+                                        kPrintedChirp, progress);
   run_references(study, table,
                  {.kind = TorqueReference::Kind::random_walk,
                   .amplitude_Nm = kChirp.amplitude,
-                  .duration_s = duration_s},
+                  .duration_s = chirp.duration_s},
                  "random walk", inverses, kPrintedWalk, progress);
-  add_bands(study, table, errors_Nm, duration_s);
+  add_bands(study, table, errors_Nm, chirp);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -84,58 +83,50 @@ Impact drop(const DataSheet& sheet, const Drop& of, double duration_s) {
   return impact;
 }
 
-/// Lowest and highest of some values.
-struct Span {
-  double lowest = std::numeric_limits<double>::infinity();
-  double highest = -std::numeric_limits<double>::infinity();
-  void add(double value) {
-    lowest = std::min(lowest, value);
-    highest = std::max(highest, value);
-  }
-};
-
-struct Spans {
-  Span with_N;
-  Span without_N;
-  Span reduction_percent;
-  Span twist_rad;
-  std::size_t cases = 0;
-  std::size_t as_printed = 0;  ///< whose reduction is that of the paper or more
+/// One value for each case.
+struct Impacts {
+  std::vector<double> with_N;
+  std::vector<double> without_N;
+  std::vector<double> reduction_percent;
+  std::vector<double> twist_rad;
 
   void add(const Impact& clutched, const Impact& fixed) {
-    const double percent = 100.0 * (1.0 - clutched.largest_N / fixed.largest_N);
-    with_N.add(clutched.largest_N);
-    without_N.add(fixed.largest_N);
-    reduction_percent.add(percent);
-    twist_rad.add(fixed.twist_rad);
-    ++cases;
-    if (percent >= kPrintedReduction.value) ++as_printed;
+    with_N.push_back(clutched.largest_N);
+    without_N.push_back(fixed.largest_N);
+    reduction_percent.push_back(100.0 * (1.0 - clutched.largest_N / fixed.largest_N));
+    twist_rad.push_back(fixed.twist_rad);
   }
 };
 
-void add_rows(QuantityTable& table, const std::string& condition, const Spans& spans) {
+void add_rows(QuantityTable& table, const std::string& condition, const Impacts& impacts) {
   using Published = std::optional<PaperFigure>;
-  const auto row = [&](const char* quantity, const Span& span, const char* unit,
+  const auto row = [&](const char* quantity, const std::vector<double>& values, const char* unit,
                        const Published& published = {}) {
-    for (const auto& [end, value] : {std::pair("lowest", span.lowest), {"highest", span.highest}})
+    const auto [lowest, highest] = std::ranges::minmax(values);
+    for (const auto& [end, value] : {std::pair("lowest", lowest), {"highest", highest}})
       table.rows.push_back({.condition = condition,
                             .quantity = fmt::format("{}, {}", quantity, end),
                             .value = value,
                             .unit = unit,
                             .published = published});
   };
-  row("largest force with the clutch", spans.with_N, "N",
+  row("largest force with the clutch", impacts.with_N, "N",
       paper_figure("002", "Fig. 10", "with clutch", "peak force"));
-  row("largest force without", spans.without_N, "N",
+  row("largest force without", impacts.without_N, "N",
       paper_figure("002", "Fig. 10", "without clutch", "peak force"));
-  row("reduction of the largest force", spans.reduction_percent, "%", kPrintedReduction);
-  row("largest twist of the rubber without the clutch", spans.twist_rad, "rad");
+  row("reduction of the largest force", impacts.reduction_percent, "%", kPrintedReduction);
+  row("largest twist of the rubber without the clutch", impacts.twist_rad, "rad");
+  const std::size_t cases = impacts.reduction_percent.size();
+  const auto as_printed =
+      static_cast<std::size_t>(std::ranges::count_if(impacts.reduction_percent, [](double percent) {
+        return percent >= kPrintedReduction.value;
+      }));
   table.rows.push_back(
       {.condition = condition,
        .quantity = "cases with the printed reduction or more",
-       .value = 100.0 * static_cast<double>(spans.as_printed) / static_cast<double>(spans.cases),
+       .value = 100.0 * static_cast<double>(as_printed) / static_cast<double>(cases),
        .unit = "%",
-       .remark = fmt::format("{} of {}", spans.as_printed, spans.cases)});
+       .remark = fmt::format("{} of {}", as_printed, cases)});
 }
 
 }  // namespace
@@ -158,8 +149,8 @@ Study drop_002(const StudyOptions& options, const Progress& progress) {
   std::get<ClutchSheet>(without.first).static_torque_Nm =
       std::get<ClutchSheet>(data_sheet("rubber-clutch:no-clutch").first).static_torque_Nm;
   const double duration_s = options.is_quick ? kQuickDuration_s : kDuration_s;
-  Spans all;
-  std::vector<Spans> by_contact(kContacts_N_m.size());
+  Impacts all;
+  std::vector<Impacts> by_contact(kContacts_N_m.size());
   for (std::size_t a = 0; a < kArms_m.size(); ++a)
     for (const double link_m : kLinks_m)
       for (std::size_t c = 0; c < kContacts_N_m.size(); ++c)

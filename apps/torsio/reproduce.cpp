@@ -257,7 +257,7 @@ void add_reproduce(CLI::App& app) {
       "continues where it was; another build of the program does not use them. "
       "public-benchmarks and model-comparison read recordings in TORSIO_DATA or "
       "../shared/data; 003-coupling runs CalculiX (apt-get install calculix-ccx); 004-sensitivity "
-      "takes half an hour.");
+      "takes a quarter of an hour.");
   verb->add_option("ITEM", flags->items, "name of an experiment; --list shows them");
   verb->add_flag("--list", flags->list,
                  "show the experiments and every item of the papers with its status");
