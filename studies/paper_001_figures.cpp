@@ -221,6 +221,7 @@ void add_tracking(Study& study, QuantityTable& table, const Progress& progress) 
                    .seed = options.seed,
                    .duration_s = options.is_quick ? std::optional(kQuick_s) : std::nullopt});
   std::vector<AnyInverse> inverses;
+  inverses.reserve(kTrackingFamilies.size());
   for (const LoopFamily& family : kTrackingFamilies)
     inverses.push_back(learned_inverse(family, dataset, options.seed));
   const auto errors_Nm = run_references(study, table, chirp_reference(chirp), "chirp", inverses,
