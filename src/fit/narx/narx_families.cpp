@@ -72,6 +72,8 @@ ParameterDescription describe_equation(const AnyParameters& parameters,
 /// @param variations what a structure search tries; empty: it leaves the family out
 template <class M, auto kFit>
 FamilyInfo narx_family(std::string_view summary, std::string_view name = Narx<M>::kFamily,
+                       // It is moved, which clang-tidy does not see in a template.
+                       // NOLINTNEXTLINE(performance-unnecessary-value-param)
                        std::vector<OptionVariation> variations = {}) {
   const bool in_search = !variations.empty();
   return family_of<narx<M, kFit>>({.name = name,
