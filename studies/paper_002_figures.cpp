@@ -45,8 +45,9 @@ void add_state(QuantityTable& table, const char* condition, const DataSheet& she
                double to_rad, double speed_rad_s) {
   TurnedSensor sensor(sheet, kTurnStep_s,
                       is_clamped ? std::nullopt : std::optional(sheet.joint.inertia_kg_m2.value));
-  for (double input_rad = 0.0; input_rad < to_rad; input_rad += speed_rad_s * kTurnStep_s)
-    sensor.step(input_rad);
+  const double step_rad = speed_rad_s * kTurnStep_s;
+  const auto steps = static_cast<std::size_t>(std::ceil(to_rad / step_rad));
+  for (std::size_t n = 0; n < steps; ++n) sensor.step(static_cast<double>(n) * step_rad);
   sensor.step(to_rad);
   const auto row = [&](const char* quantity, double value, const char* unit) {
     table.rows.push_back(
