@@ -15,6 +15,9 @@ namespace {
 using design::StrainMetric;
 
 constexpr double kLimit = 0.6;  // strain of Table 2
+// The drawn curves of Figure 6 reach 15 deg.
+constexpr double kTorqueStep_deg = 0.5;
+constexpr int kTorquePoints = 30;
 
 const PaperFigure& figure_of(std::string_view geometry, std::string_view quantity) {
   return *find_paper_figure("003", "Table 2", geometry, quantity);
@@ -150,11 +153,13 @@ void add_figures(Study& study, const std::vector<Twisted>& all,
     strains.series.push_back(std::move(strain));
     XySeries torque{.label = all[i].geometry, .x = {}, .y = {}};
     const auto curve = torque_curve(curves[i], all[i].demand.length_mm, modulus_MPa);
-    for (double angle_deg = 0.5; angle_deg <= 15.0; angle_deg += 0.5)
+    for (int n = 1; n <= kTorquePoints; ++n) {
+      const double angle_deg = kTorqueStep_deg * n;
       if (const auto torque_Nm = design::torque_at(curve, angle_deg)) {
         torque.x.push_back(angle_deg);
         torque.y.push_back(*torque_Nm);
       }
+    }
     torques.series.push_back(std::move(torque));
   }
   study.figures = {std::move(strains), std::move(torques)};
