@@ -33,6 +33,7 @@ struct TorqueModeSpec {
 
 /// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of
 /// the data sheet, other amplitudes, the same output (specification 6, observation 1).
+// NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name)
 void add_torque_mode(Dataset& dataset, const TorqueModeSpec& spec);
 
 /// The inverse of a family for a loop, trained on these data.
