@@ -33,24 +33,22 @@ void add_reductions(QuantityTable& table) {
   constexpr std::string_view kProposed = "Proposed";
   double least_cm3_Nm = std::numeric_limits<double>::infinity();
   double least_g = std::numeric_limits<double>::infinity();
-  PublishedTorqueSensor proposed{};
-  for (const PublishedTorqueSensor& sensor : torque_sensors_002()) {
-    if (sensor.name == kProposed) {
-      proposed = sensor;
-      continue;
-    }
+  const auto sensors = torque_sensors_002();
+  const auto proposed = std::ranges::find(sensors, kProposed, &PublishedTorqueSensor::name);
+  for (const PublishedTorqueSensor& sensor : sensors) {
+    if (sensor.name == kProposed) continue;
     // Comparisons with NaN, for what is not printed, are false.
     const double ratio_cm3_Nm = sensor.volume_cm3 / sensor.torque_Nm;
     if (ratio_cm3_Nm < least_cm3_Nm) least_cm3_Nm = ratio_cm3_Nm;
     if (sensor.weight_g < least_g) least_g = sensor.weight_g;
   }
   constexpr const char* kAgainst = "against state of the art";
-  const double ratio_cm3_Nm = proposed.volume_cm3 / proposed.torque_Nm;
+  const double ratio_cm3_Nm = proposed->volume_cm3 / proposed->torque_Nm;
   add(table, "Table I", "volume per torque below the least of the others by",
       100.0 * (1.0 - ratio_cm3_Nm / least_cm3_Nm), "%",
       paper_figure("002", "section V", kAgainst, "volume per torque reduction"));
   add(table, "Table I", "weight below the least of the others by",
-      100.0 * (1.0 - proposed.weight_g / least_g), "%",
+      100.0 * (1.0 - proposed->weight_g / least_g), "%",
       paper_figure("002", "section V", kAgainst, "weight reduction"));
 }
 
