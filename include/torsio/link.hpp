@@ -5,6 +5,7 @@
 //   JointEndpoint    the joint's side: bytes in, calls of a `LinkJoint` and its registers, frames out
 //   HostEndpoint     the host's side: messages to frames, bytes to messages, the joint's clock and the sequence of commands
 //   JointConnection  the host's side for programs of a person: calls that wait for the reply, by names of registers
+//   JointGroup       telemetry of several joints of one line at the same time, without control
 //   RegisterTable    parameters and measured values with unit, range and access
 //   NdlcomDecoder    frames of NDLCom from a stream of bytes; `encode_ndlcom` writes them
 
@@ -15,6 +16,7 @@
 #include "torsio/link/hostile_wire.hpp"
 #include "torsio/link/joint_connection.hpp"
 #include "torsio/link/joint_endpoint.hpp"
+#include "torsio/link/joint_group.hpp"
 #include "torsio/link/joint_line.hpp"
 #include "torsio/link/line_budget.hpp"
 #include "torsio/link/link_messages.hpp"

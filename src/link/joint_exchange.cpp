@@ -9,6 +9,8 @@ namespace {
 
 /// More than a minute of 1 kHz: telemetry that no `poll` takes must not fill the memory.
 constexpr std::size_t kStoredTelemetry = 1 << 16;
+/// Telemetry that arrives late has been overtaken by fewer than this.
+constexpr std::uint32_t kLongestDelay = 1000;
 constexpr std::int64_t kRenewalPeriod_ns = 1'000'000'000;
 
 std::string_view refusal_advice(LinkRefusal reason) noexcept {
@@ -42,9 +44,12 @@ JointConnection::Exchange::Exchange(std::shared_ptr<LinkTransport> line, const s
       line_(std::move(line)),
       place_(fmt::format("joint {} at {}", settings.joint, place)),
       timeout_ns_(static_cast<std::int64_t>(1e9 * settings.timeout_s)),
+      ping_period_ns_(static_cast<std::int64_t>(1e9 * settings.ping_period_s)),
       host_({.id = settings.id, .joint = settings.joint, .rules = settings.rules}) {
   require(settings.timeout_s >= 1e-3 && settings.timeout_s <= 60.0, "joint connection: timeout_s",
           "0.001 to 60", settings.timeout_s);
+  require(settings.ping_period_s >= 1e-3 && settings.ping_period_s <= 60.0,
+          "joint connection: ping_period_s", "0.001 to 60", settings.ping_period_s);
   require(settings.tries >= 1, "joint connection: tries", "at least 1",
           fmt::format("{}", settings.tries));
 }
@@ -92,6 +97,12 @@ void JointConnection::Exchange::throw_silence(std::string_view what, bool is_com
 void JointConnection::Exchange::store(const LinkTelemetry& telemetry) {
   if (telemetry.mask != subscription_.mask) return;  // an earlier subscription
   ++counts_.telemetry;
+  // A joint that was started again, or in which the subscription had ended, numbers from 0.
+  const bool is_renumbered =
+      telemetry.sequence < next_sequence_ &&
+      (telemetry.time_ns > latest_ns_ || next_sequence_ - telemetry.sequence > kLongestDelay);
+  if (is_renumbered) has_sequence_ = false;
+  latest_ns_ = is_renumbered ? telemetry.time_ns : std::max(latest_ns_, telemetry.time_ns);
   if (has_sequence_ && telemetry.sequence > next_sequence_)
     counts_.lost += telemetry.sequence - next_sequence_;
   if (!has_sequence_ || telemetry.sequence >= next_sequence_)
@@ -111,7 +122,7 @@ void JointConnection::Exchange::ping() {
 
 void JointConnection::Exchange::keep_young() {
   const std::int64_t now_ns = detail::monotonic_ns();
-  if (now_ns - std::max(heard_ns_, pinged_ns_) >= kPingPeriod_ns) ping();
+  if (now_ns - std::max(heard_ns_, pinged_ns_) >= ping_period_ns_) ping();
   if (subscription_.mask != 0 && now_ns - renewed_ns_ >= kRenewalPeriod_ns) renew(subscription_);
 }
 

@@ -88,7 +88,7 @@ class JointConnection::Exchange {
     const std::int64_t end_ns = detail::monotonic_ns() + longest_ns;
     receive(visit);
     for (std::int64_t left_ns = 0; !is_done() && (left_ns = end_ns - detail::monotonic_ns()) > 0;) {
-      static_cast<void>(line_->wait(std::min(left_ns, kPingPeriod_ns)));
+      static_cast<void>(line_->wait(std::min(left_ns, ping_period_ns_)));
       receive(visit);
       keep_young();
     }
@@ -105,8 +105,6 @@ class JointConnection::Exchange {
   [[nodiscard]] const std::string& place() const noexcept { return place_; }
 
  private:
-  static constexpr std::int64_t kPingPeriod_ns = 5'000'000;
-
   template <class Visit>
   void receive(const Visit& visit) {
     std::array<std::uint8_t, 2048> buffer;
@@ -145,6 +143,7 @@ class JointConnection::Exchange {
   std::shared_ptr<LinkTransport> line_;
   std::string place_;
   std::int64_t timeout_ns_;
+  std::int64_t ping_period_ns_;
   HostEndpoint host_;
   bool was_silent_ = false;  ///< a try of the last request
   LinkRefusal refusal_ = LinkRefusal::none;
@@ -158,6 +157,7 @@ class JointConnection::Exchange {
   std::deque<LinkTelemetry> telemetry_ = {};
   std::uint32_t next_sequence_ = 0;  ///< the next one of the telemetry
   bool has_sequence_ = false;
+  std::uint64_t latest_ns_ = 0;  ///< time of the telemetry, by the joint's clock
   Counts counts_ = {};
   std::optional<LinkState> state_ = {};
 };

@@ -39,6 +39,9 @@ class JointConnection {
     NdlcomRules rules = NdlcomRules::strict;
     double timeout_s = 0.1;  ///< for a reply; 1 ms to 60 s
     int tries = 5;           ///< at least 1
+    /// While nothing else of the joint is heard; 1 ms to 60 s. Commands are as old as this: longer only for a host that sends
+    /// none.
+    double ping_period_s = 0.005;
   };
   struct Information {
     LinkDriveState state = {};
