@@ -28,7 +28,7 @@ class JointGroup {
     NdlcomRules rules = NdlcomRules::strict;
     double timeout_s = 0.1;      ///< for a reply; 1 ms to 60 s
     int tries = 5;               ///< at least 1
-    double ping_period_s = 0.1;  ///< of a joint of which nothing is heard; 1 ms to 60 s
+    double ping_period_s = 0.1;  ///< while nothing of a joint is heard; 1 ms to 60 s
     double silence_s = 0.5;      ///< without telemetry, after which a joint is silent
   };
   /// @param joint index in `Settings::joints`

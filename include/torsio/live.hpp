@@ -1,0 +1,7 @@
+#pragma once
+
+// Start here to show joints in a browser, or to give their telemetry to programs of others. Needs libwebsockets.
+//
+//   WebServer   files from memory and WebSockets, in a thread of its own
+
+#include "torsio/live/web_server.hpp"
