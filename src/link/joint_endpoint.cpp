@@ -62,6 +62,9 @@ JointEndpoint::JointEndpoint(const Settings& settings, LinkJoint& joint,
       line_(settings.line_B_s) {
   require(settings.id != kNdlcomReserved && settings.id != kNdlcomBroadcast, kJointPlace,
           "an id of 1 to 254", fmt::format("{}", settings.id));
+  require(settings.bus_host != kNdlcomBroadcast && settings.bus_host != settings.id, kJointPlace,
+          "another id of the host of the bus than 255 and that of the joint",
+          fmt::format("{}", settings.bus_host));
   require_positive(kJointPlace, "the rate of the ticks", settings.tick_rate_Hz);
   require(settings.line_B_s > 0.0, kJointPlace, "a line with more than 0 bytes per second",
           settings.line_B_s);
@@ -80,7 +83,7 @@ void JointEndpoint::take(const NdlcomFrame& frame, std::uint64_t now_ns) noexcep
     return;
   }
   if (frame.sender == kNdlcomReserved || frame.sender == kNdlcomBroadcast ||
-      frame.sender == settings_.id) {
+      frame.sender == settings_.id || frame.sender == settings_.bus_host) {
     ++counts_.without_sender;
     return;
   }
@@ -146,6 +149,39 @@ LinkRefusal JointEndpoint::guarded(const Message& message, Context& context) noe
 }
 
 template <class Message>
+LinkRefusal JointEndpoint::guarded_for_bus(Message message, std::uint64_t arrived_ns,
+                                           std::uint64_t now_ns) noexcept {
+  message.seal = {.sequence = ++bus_sequence_, .clock_ns = arrived_ns};
+  Context context{.route = {.receiver = settings_.id, .sender = settings_.bus_host},
+                  .now_ns = now_ns};
+  return guarded(message, context);
+}
+
+LinkRefusal JointEndpoint::execute_for_bus(const LinkStateChange& message, std::uint64_t arrived_ns,
+                                           std::uint64_t now_ns) noexcept {
+  return guarded_for_bus(message, arrived_ns, now_ns);
+}
+LinkRefusal JointEndpoint::execute_for_bus(const LinkReference& message, std::uint64_t arrived_ns,
+                                           std::uint64_t now_ns) noexcept {
+  return guarded_for_bus(message, arrived_ns, now_ns);
+}
+LinkRefusal JointEndpoint::execute_for_bus(const LinkModeChange& message, std::uint64_t arrived_ns,
+                                           std::uint64_t now_ns) noexcept {
+  return guarded_for_bus(message, arrived_ns, now_ns);
+}
+LinkRefusal JointEndpoint::execute_for_bus(const LinkRegisterWrite& message,
+                                           std::uint64_t arrived_ns,
+                                           std::uint64_t now_ns) noexcept {
+  return guarded_for_bus(message, arrived_ns, now_ns);
+}
+
+void JointEndpoint::stop_for_bus(StopCategory category, std::uint64_t now_ns) noexcept {
+  Context context{.route = {.receiver = settings_.id, .sender = settings_.bus_host},
+                  .now_ns = now_ns};
+  static_cast<void>(execute(LinkStop{.category = static_cast<std::uint8_t>(category)}, context));
+}
+
+template <class Message>
 void JointEndpoint::finish(const Message& message, const Context& context,
                            LinkRefusal refusal) noexcept {
   const std::uint8_t host = context.route.sender;
@@ -182,6 +218,7 @@ void JointEndpoint::refuse_to(std::uint8_t host, std::uint8_t message, std::uint
 
 void JointEndpoint::send_payload(std::uint8_t host,
                                  std::span<const std::uint8_t> payload) noexcept {
+  if (host == settings_.bus_host) return;
   std::array<std::uint8_t, kNdlcomMaxEncodedBytes> frame;
   const std::size_t size = encode_ndlcom(
       {.receiver = host, .sender = settings_.id, .counter = sent_.next(host), .payload = payload},

@@ -100,10 +100,12 @@ class JointEndpoint {
     NdlcomRules rules = NdlcomRules::strict;
     double line_B_s =
         std::numeric_limits<double>::infinity();  ///< bytes per second that the line carries
+    /// Id of a host that commands by `execute_for_bus`, and that no frame may have as its sender; 0: there is none.
+    std::uint8_t bus_host = 0;
   };
   struct Counts {
     std::uint64_t to_others = 0;       ///< frames for another receiver
-    std::uint64_t without_sender = 0;  ///< from id 0, 255 or the joint's own
+    std::uint64_t without_sender = 0;  ///< from id 0, 255, the joint's own or the `bus_host`
     std::uint64_t broadcasts = 0;      ///< that are not a stop
     std::uint64_t unknown = 0;         ///< messages without a known id, or that only hosts receive
     std::uint64_t executed = 0;        ///< commands, references included
@@ -132,6 +134,30 @@ class JointEndpoint {
   }
   /// Once per tick of the joint, after its measurements: watchdog, faults, telemetry.
   void tick(std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+
+  // A line whose frames are not those of NDLCom, as a CAN bus: what it receives becomes these commands of the `bus_host`. Guard,
+  // states, limits and counters are those of every other host; nothing is sent to it. A frame without clock and sequence is as
+  // old as its arrival, and is executed once.
+
+  /// @param arrived_ns when the frame arrived, by the clock of the joint: a command that has waited is too old after T
+  /// @returns `none`, or why it was not executed: `count_refused`
+  [[nodiscard]] LinkRefusal execute_for_bus(const LinkStateChange& message,
+                                            std::uint64_t arrived_ns,
+                                            std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+  [[nodiscard]] LinkRefusal execute_for_bus(const LinkReference& message, std::uint64_t arrived_ns,
+                                            std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+  [[nodiscard]] LinkRefusal execute_for_bus(const LinkModeChange& message, std::uint64_t arrived_ns,
+                                            std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+  [[nodiscard]] LinkRefusal execute_for_bus(const LinkRegisterWrite& message,
+                                            std::uint64_t arrived_ns,
+                                            std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+  /// A stop needs no control.
+  void stop_for_bus(StopCategory category, std::uint64_t now_ns) noexcept TORSIO_REALTIME;
+  /// A message of that line that was not executed.
+  void count_refused(LinkRefusal reason) noexcept TORSIO_REALTIME {
+    counts_.refused[static_cast<std::size_t>(reason)] += reason == LinkRefusal::none ? 0U : 1U;
+  }
+  [[nodiscard]] std::uint8_t bus_host() const noexcept { return settings_.bus_host; }
 
   [[nodiscard]] const DriveState& drive() const noexcept { return drive_; }
   [[nodiscard]] const CommandGuard& guard() const noexcept { return guard_; }
@@ -170,6 +196,9 @@ class JointEndpoint {
   void take_message(const NdlcomFrame& frame, std::uint64_t now_ns) noexcept;
   template <class Message>
   LinkRefusal guarded(const Message& message, Context& context) noexcept;
+  template <class Message>
+  LinkRefusal guarded_for_bus(Message message, std::uint64_t arrived_ns,
+                              std::uint64_t now_ns) noexcept;
   template <class Message>
   void finish(const Message& message, const Context& context, LinkRefusal refusal) noexcept;
   void refuse_to(std::uint8_t host, std::uint8_t message, std::uint64_t sequence,
@@ -223,6 +252,7 @@ class JointEndpoint {
   Upload upload_ = {};
   std::uint8_t last_host_ = 0;  ///< the last that was in control
   std::uint64_t last_tick_ns_ = 0;
+  std::uint64_t bus_sequence_ = 0;
   Counts counts_ = {};
 };
 
