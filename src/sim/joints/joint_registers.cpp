@@ -179,6 +179,16 @@ void add_counters(ServedJoint& of, std::vector<LinkRegister>& all) {
       of, "frames_not_sent", "the line did not take them"));
 }
 
+void add_motor(ServedJoint& of, std::vector<LinkRegister>& all) {
+  all.push_back(
+      reading<[](const ServedJoint& from) { return from.joint->drive().torque_constant_Nm_A; }>(
+          of, {.name = "torque_constant_Nm_A",
+               .unit = "Nm/A",
+               .description = "at the rotor, of the data sheet"}));
+  all.push_back(reading<[](const ServedJoint& from) { return from.joint->drive().supply_V; }>(
+      of, {.name = "supply_V", .unit = "V", .description = "of the data sheet; does not vary"}));
+}
+
 }  // namespace
 
 std::vector<LinkRegister> joint_registers(ServedJoint& of) {
@@ -187,6 +197,7 @@ std::vector<LinkRegister> joint_registers(ServedJoint& of) {
   add_parameters(of, all);
   add_states(of, all);
   add_counters(of, all);
+  add_motor(of, all);
   return all;
 }
 

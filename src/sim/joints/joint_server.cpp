@@ -58,7 +58,8 @@ class FrameBundle : public LinkSink {
 
 class JointServer::Parts {
  public:
-  Parts(std::vector<ServedArm> served, const Settings& settings, LinkTransport& line_transport);
+  Parts(std::vector<ServedArm> served, const Settings& settings, LinkTransport& line_transport,
+        CanBus* can_bus);
 
   void cycle(std::uint64_t now_ns) noexcept;
   std::vector<std::string> take_events();
@@ -69,6 +70,8 @@ class JointServer::Parts {
   LinkTransport& transport;
   FrameBundle bundle;
   NdlcomDecoder decoder;
+  CanBus* can;                             ///< null: none
+  std::optional<CanSimpleLine> can_nodes;  ///< with a bus: its nodes
 
  private:
   /// What was last reported of a joint.
@@ -79,7 +82,9 @@ class JointServer::Parts {
   };
 
   void add(LinkedArm& arm, std::uint8_t first_id, const Settings& settings, double line_B_s);
+  void add_can_nodes(const Settings& settings);
   void receive(std::uint64_t now_ns) noexcept;
+  void receive_can(std::uint64_t now_ns) noexcept;
   void dispatch(const NdlcomFrame& frame, std::uint64_t now_ns) noexcept;
   void note_events() noexcept;
   void note(std::size_t joint, ServerEvent event, double value, double reason) noexcept;
@@ -95,8 +100,8 @@ class JointServer::Parts {
 };
 
 JointServer::Parts::Parts(std::vector<ServedArm> served, const Settings& settings,
-                          LinkTransport& line_transport)
-    : transport(line_transport), bundle(line_transport), decoder(settings.rules) {
+                          LinkTransport& line_transport, CanBus* can_bus)
+    : transport(line_transport), bundle(line_transport), decoder(settings.rules), can(can_bus) {
   require(!served.empty(), kServerPlace, "at least one joint", "none");
   Random seeds(settings.seed);
   std::size_t count = 0;
@@ -112,6 +117,7 @@ JointServer::Parts::Parts(std::vector<ServedArm> served, const Settings& setting
   for (ServedJoint& each : joints) uploads.push_back(&each.joint->upload());
   reported_.resize(joints.size());
   line.place = transport.place();
+  if (can != nullptr) add_can_nodes(settings);
   worker_.emplace(std::move(uploads));
 }
 
@@ -129,13 +135,26 @@ void JointServer::Parts::add(LinkedArm& arm, std::uint8_t first_id, const Settin
     made.watchdog_s = settings.watchdog_s;
     made.registers = joint_registers(made);
     made.table.emplace(made.registers);
-    made.endpoint.emplace(JointEndpoint::Settings{.id = made.id,
-                                                  .watchdog_s = settings.watchdog_s,
-                                                  .tick_rate_Hz = kBenchRate_Hz,
-                                                  .rules = settings.rules,
-                                                  .line_B_s = line_B_s},
-                          *made.joint, *made.table, bundle);
+    made.endpoint.emplace(
+        JointEndpoint::Settings{.id = made.id,
+                                .watchdog_s = settings.watchdog_s,
+                                .tick_rate_Hz = kBenchRate_Hz,
+                                .rules = settings.rules,
+                                .line_B_s = line_B_s,
+                                .bus_host = can == nullptr ? std::uint8_t{0} : kCanHost},
+        *made.joint, *made.table, bundle);
   }
+}
+
+void JointServer::Parts::add_can_nodes(const Settings& settings) {
+  std::vector<std::unique_ptr<CanSimpleNode>> nodes;
+  for (ServedJoint& each : joints)
+    nodes.push_back(std::make_unique<CanSimpleNode>(
+        CanSimpleNode::Settings{.node = each.id,
+                                .tick_rate_Hz = kBenchRate_Hz,
+                                .estimate_rate_Hz = settings.can_rate_Hz},
+        *each.endpoint, *each.joint, *each.table, *can));
+  can_nodes.emplace(std::move(nodes));
 }
 
 void JointServer::Parts::cycle(std::uint64_t now_ns) noexcept {
@@ -143,6 +162,7 @@ void JointServer::Parts::cycle(std::uint64_t now_ns) noexcept {
   for (ServedJoint& each : joints) each.endpoint->tick(now_ns);
   receive(now_ns);
   static_cast<void>(bundle.flush());  // the transport counts what it does not take
+  if (can_nodes) receive_can(now_ns);
   for (auto& arm : arms) arm->control();
   note_events();
   ++tick_;
@@ -156,6 +176,13 @@ void JointServer::Parts::receive(std::uint64_t now_ns) noexcept {
     std::span<const std::uint8_t> left = std::span(bytes_).first(size);
     while (const auto frame = decoder.next(left)) dispatch(*frame, now_ns);
   }
+}
+
+void JointServer::Parts::receive_can(std::uint64_t now_ns) noexcept {
+  can_nodes->tick(now_ns);
+  const int most = kReadsPerJoint * static_cast<int>(joints.size());
+  CanFrame frame;
+  for (int n = 0; n < most && can->receive(frame); ++n) can_nodes->receive(frame, now_ns);
 }
 
 void JointServer::Parts::dispatch(const NdlcomFrame& frame, std::uint64_t now_ns) noexcept {
@@ -202,8 +229,9 @@ std::string JointServer::Parts::text_of(std::span<const double> row) const {
   const std::string start = fmt::format("{:10.3f} s  joint {}: ", row[0], of.id);
   switch (static_cast<ServerEvent>(row[2])) {
     case ServerEvent::control:
-      return start +
-             (row[3] == 0.0 ? "no host in control" : fmt::format("host {} in control", row[3]));
+      if (row[3] == 0.0) return start + "no host in control";
+      if (can != nullptr && row[3] == kCanHost) return start + "the CAN bus in control";
+      return start + fmt::format("host {} in control", row[3]);
     case ServerEvent::refused: return start + fmt::format("{} messages refused", row[3]);
     case ServerEvent::state: break;
   }
@@ -226,8 +254,8 @@ std::vector<std::string> JointServer::Parts::take_events() {
 }
 
 JointServer::JointServer(std::vector<ServedArm> arms, const Settings& settings,
-                         LinkTransport& transport)
-    : parts_(std::make_unique<Parts>(std::move(arms), settings, transport)) {}
+                         LinkTransport& transport, CanBus* can)
+    : parts_(std::make_unique<Parts>(std::move(arms), settings, transport, can)) {}
 JointServer::~JointServer() = default;
 
 void JointServer::cycle(std::uint64_t now_ns) noexcept { parts_->cycle(now_ns); }
@@ -263,6 +291,13 @@ JointServer::LineStatus JointServer::line() const {
   status.frames = parts_->decoder.counts();
   status.transport = parts_->transport.counts();
   return status;
+}
+
+std::optional<JointServer::CanStatus> JointServer::can() const {
+  if (parts_->can == nullptr) return std::nullopt;
+  return CanStatus{.place = parts_->can->place(),
+                   .frames = parts_->can_nodes->counts(),
+                   .bus = parts_->can->counts()};
 }
 
 std::string JointServer::registers(std::uint8_t id) const {

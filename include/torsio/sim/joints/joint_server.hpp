@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/link/can_simple.hpp"
 #include "torsio/link/drive_state.hpp"
 #include "torsio/link/joint_endpoint.hpp"
 #include "torsio/link/link_transport.hpp"
@@ -34,7 +36,8 @@ class JointServer {
     NdlcomRules rules = NdlcomRules::strict;
     /// With the elasticity of the gears, which takes twice the time: else rotor and gear output turn together.
     bool has_gear_stage = false;
-    std::uint64_t seed = 1;  ///< for the noise of the sensors
+    std::uint64_t seed = 1;      ///< for the noise of the sensors
+    double can_rate_Hz = 100.0;  ///< as `CanSimpleNode::Settings::estimate_rate_Hz`
   };
   /// What a joint is, and what has happened to it.
   struct JointStatus {
@@ -54,10 +57,21 @@ class JointServer {
     LinkTransport::Counts transport = {};
     std::uint64_t to_no_joint = 0;  ///< frames for an id that is not here
   };
+  /// What happened on the CAN bus.
+  struct CanStatus {
+    std::string place = {};
+    CanSimpleLine::Counts frames = {};
+    CanBus::Counts bus = {};
+  };
+  /// The host that all hosts of the CAN bus are for the joints: as `JointEndpoint::Settings::bus_host`.
+  static constexpr std::uint8_t kCanHost = 253;
 
-  /// @param transport outlives the server
-  /// @throws Error as `ArmController` and `JointEndpoint`, if two joints have one id, or an id is not from 1 to 254
-  JointServer(std::vector<ServedArm> arms, const Settings& settings, LinkTransport& transport);
+  /// @param transport outlives the server, as does the bus
+  /// @param can the joints are also nodes of this bus, with their ids as numbers; null: they are not
+  /// @throws Error as `ArmController` and `JointEndpoint`, if two joints have one id, or an id is not from 1 to 254, on a CAN bus
+  /// from 1 to 62
+  JointServer(std::vector<ServedArm> arms, const Settings& settings, LinkTransport& transport,
+              CanBus* can = nullptr);
   ~JointServer();
   JointServer(const JointServer&) = delete;
   JointServer& operator=(const JointServer&) = delete;
@@ -76,6 +90,8 @@ class JointServer {
   /// Not while another thread is in `cycle`.
   [[nodiscard]] std::vector<JointStatus> joints() const;
   [[nodiscard]] LineStatus line() const;
+  /// None without a CAN bus. Not while another thread is in `cycle`.
+  [[nodiscard]] std::optional<CanStatus> can() const;
   /// As `json_of(RegisterTable)`. Not while another thread is in `cycle`.
   [[nodiscard]] std::string registers(std::uint8_t id) const;
 
