@@ -7,8 +7,8 @@
 #include "torsio/core/realtime.hpp"
 #include "torsio/link/can_bus.hpp"
 
-// Frames as python-can packs them for its `udp_multicast` (can.interfaces.udp_multicast.utils): a MessagePack map with the fields
-// of a can.Message. Neither function uses the heap or throws, so that a loop can call them.
+// Frames as python-can packs them for its `udp_multicast` (can.interfaces.udp_multicast.utils): a MessagePack map with the
+// fields of a can.Message. Neither function uses the heap or throws, so that a loop can call them.
 
 namespace torsio::detail {
 

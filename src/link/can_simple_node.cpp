@@ -254,23 +254,23 @@ void CanSimpleNode::tick(std::uint64_t now_ns) noexcept {
   ++ticks_;
 }
 
-/// A change of the heartbeat is sent at once.
+/// Each frame in another tick where the period permits it. A change of the heartbeat is sent at once.
 void CanSimpleNode::send_cyclic() noexcept {
-  const bool is_status = status_period_ticks_ != 0 && ticks_ % status_period_ticks_ == 0;
-  const bool is_estimate = estimate_period_ticks_ != 0 && ticks_ % estimate_period_ticks_ == 0;
-  if (is_estimate) {
-    static_cast<void>(reply(CanSimpleCommand::get_encoder_estimates));
-    static_cast<void>(reply(CanSimpleCommand::get_iq));
-    static_cast<void>(reply(CanSimpleCommand::get_torques));
-  }
+  const auto is_due = [this](std::uint32_t period, std::uint64_t offset) {
+    return period != 0 && (ticks_ + offset) % period == 0;
+  };
+  constexpr std::array kEstimates = {CanSimpleCommand::get_encoder_estimates,
+                                     CanSimpleCommand::get_iq, CanSimpleCommand::get_torques};
+  for (std::size_t k = 0; k < kEstimates.size(); ++k)
+    if (is_due(estimate_period_ticks_, k)) static_cast<void>(reply(kEstimates[k]));
   const std::optional<CanFrame> heartbeat = frame_of(CanSimpleCommand::heartbeat);
-  if (is_status || (status_period_ticks_ != 0 && *heartbeat != heartbeat_)) {
+  if (is_due(status_period_ticks_, 3) || (status_period_ticks_ != 0 && *heartbeat != heartbeat_)) {
     heartbeat_ = *heartbeat;
     static_cast<void>(reply(CanSimpleCommand::heartbeat));
   }
-  if (!is_status) return;
-  static_cast<void>(reply(CanSimpleCommand::get_error));
-  static_cast<void>(reply(CanSimpleCommand::get_bus_voltage_current));
+  if (is_due(status_period_ticks_, 4)) static_cast<void>(reply(CanSimpleCommand::get_error));
+  if (is_due(status_period_ticks_, 5))
+    static_cast<void>(reply(CanSimpleCommand::get_bus_voltage_current));
 }
 
 bool CanSimpleNode::reply(CanSimpleCommand command) noexcept {
@@ -331,7 +331,7 @@ void CanSimpleNode::receive(const CanFrame& frame, std::uint64_t now_ns) noexcep
     else if (!reply(command))
       refusal = LinkRefusal::not_supported;
   } else if (command == CanSimpleCommand::estop) {
-    // Of any length, since whoever sends it requests a stop.
+    // Whatever its length, whoever sends it requests a stop.
     endpoint_.stop_for_bus(StopCategory::power_off, now_ns);
   } else if (frame.is_remote) {
     refusal = LinkRefusal::unknown_message;

@@ -227,7 +227,7 @@ class AMulticastBus : public testing::Test {
       GTEST_SKIP() << "no multicast here: " << error.what();
     }
   }
-  /// Of another group of ports than python-can's own, which other programs may use now.
+  /// Other programs may use python-can's own port now.
   static constexpr std::uint16_t kPort = 43217;
   static std::optional<CanFrame> received_by(CanBus& bus) {
     CanFrame frame;

@@ -12,8 +12,8 @@
 namespace torsio {
 
 inline constexpr std::size_t kCanDataBytes = 8;
-inline constexpr std::uint32_t kCanHighestId = 0x7FF;                ///< of 11 bits
-inline constexpr std::uint32_t kCanHighestExtendedId = 0x1FFF'FFFF;  ///< of 29 bits
+inline constexpr std::uint32_t kCanHighestId = 0x7FF;                ///< an id has 11 bits
+inline constexpr std::uint32_t kCanHighestExtendedId = 0x1FFF'FFFF;  ///< a long id has 29 bits
 
 /// A frame of CAN 2.0; CAN FD is not used.
 struct CanFrame {
@@ -38,7 +38,7 @@ class CanSink {
   virtual bool send(const CanFrame& frame) noexcept = 0;
 };
 
-/// A CAN bus, or what stands for one. Never waits; uses no heap after it was opened. Frames that it has sent itself are not
+/// A CAN bus, or its replacement. Never waits; uses no heap after it was opened. Frames that it has sent itself are not
 /// received. Closed by its destructor.
 class CanBus : public CanSink {
  public:

@@ -103,7 +103,7 @@ TEST_F(CanNodes, FollowPositionsAgainstInertiaAndGravity) {
 
 TEST_F(CanNodes, FollowVelocitiesInTurnsPerSecond) {
   enable(2, 2);
-  stream(900, 2, set_input_vel, 0.1F, 0.0F);  // of which the brake needs 500
+  stream(900, 2, set_input_vel, 0.1F, 0.0F);  // the brake needs 500 of them
   const double before = heard(2, get_encoder_estimates, 0);
   stream(500, 2, set_input_vel, 0.1F, 0.0F);
   EXPECT_NEAR(heard(2, get_encoder_estimates, 0) - before, 0.05, 5e-3);
