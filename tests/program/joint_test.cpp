@@ -138,12 +138,29 @@ TEST_F(JointDaemon, RefusesToListenToEveryone) {
 }
 
 TEST_F(JointDaemon, RefusesWrongCalls) {
-  for (const char* arguments :
-       {"dfki-29", "0=dfki-28", "255=dfki-28", "dfki-28,file=m", "1=dfki-28 1=dfki-50",
-        "dfki-28 --arm arm6", "--arm arm6 --link-mass 1kg", "dfki-28 --link-mass 50kg",
-        "--unix a --serial b", "--baud 9600", "--fast --realtime", "--duration 0s",
-        "--watchdog 1us", "--fault 2:gear_angle=freeze@3s", "--fault gear_angle=freeze@3s",
-        "--allow 10.0.0.300 --listen 127.0.0.1"})
+  for (const char* arguments : {"dfki-29",
+                                "0=dfki-28",
+                                "255=dfki-28",
+                                "dfki-28,file=m",
+                                "1=dfki-28 1=dfki-50",
+                                "dfki-28 --arm arm6",
+                                "--arm arm6 --link-mass 1kg",
+                                "dfki-28 --link-mass 50kg",
+                                "--unix a --serial b",
+                                "--baud 9600",
+                                "--fast --realtime",
+                                "--duration 0s",
+                                "--watchdog 1us",
+                                "--fault 2:gear_angle=freeze@3s",
+                                "--fault gear_angle=freeze@3s",
+                                "--allow 10.0.0.300 --listen 127.0.0.1",
+                                "--can virtual:can0",
+                                "--can socketcan",
+                                "--can socketcan:nocan7",
+                                "--can udp_multicast:127.0.0.1",
+                                "--can udp_multicast::0",
+                                "--can-rate 10Hz",
+                                "63=dfki-28 --can udp_multicast"})
     EXPECT_THAT(shell(std::string("timeout 20 {torsio} joint ") + arguments).exit_code,
                 testing::AnyOf(kWorkFailed, kCallWasWrong))
         << arguments;

@@ -40,6 +40,7 @@ struct JointFlags {
   ServedJointFlags served;
   JointLineFlags line;
   std::string watchdog = "50ms";
+  std::string can_rate = "100Hz";
   std::string duration;
   std::uint64_t seed = kDefaultSeed;
   bool is_lenient = false;
@@ -158,6 +159,13 @@ std::string summary(const Cycles& done, const torsio::JointServer& server) {
                fmt::format("{}", joint.counts.all_refused()),
                fmt::format("{}", joint.counts.not_sent)});
   const torsio::JointServer::LineStatus line = server.line();
+  std::string can;
+  if (const auto bus = server.can())
+    can = fmt::format(
+        "{} CAN frames, {} for other nodes, {} extended, {} error frames, {} malformed, "
+        "{} of other hosts, {} not sent\n",
+        bus->frames.frames, bus->frames.to_no_node + bus->frames.broadcasts, bus->frames.extended,
+        bus->frames.errors, bus->bus.malformed, bus->bus.foreign, bus->bus.not_sent);
   return table.text() +
          fmt::format(
              "{} cycles, {} late, {} skipped{}; CPU time of a cycle {:.1f} us (median), "
@@ -169,7 +177,8 @@ std::string summary(const Cycles& done, const torsio::JointServer& server) {
                             : std::string(),
              us(done.cpu_time.quantile_ns(0.5)), us(done.cpu_time.quantile_ns(0.999)),
              us(done.cpu_time.max_ns()), line.frames.frames, line.frames.crc_errors,
-             line.frames.malformed, line.to_no_joint, line.transport.foreign);
+             line.frames.malformed, line.to_no_joint, line.transport.foreign) +
+         can;
 }
 
 JointJson run_json(const JointFlags& flags, const Cycles& done, const torsio::JointServer& server) {
@@ -191,6 +200,15 @@ JointJson run_json(const JointFlags& flags, const Cycles& done, const torsio::Jo
                      {"crc_errors", line.frames.crc_errors},
                      {"malformed", line.frames.malformed},
                      {"joints", JointJson::array()}};
+  if (const auto bus = server.can())
+    document["can"] = {{"place", bus->place},
+                       {"frames", bus->frames.frames},
+                       {"to_other_nodes", bus->frames.to_no_node + bus->frames.broadcasts},
+                       {"extended", bus->frames.extended},
+                       {"error_frames", bus->frames.errors},
+                       {"malformed", bus->bus.malformed},
+                       {"foreign", bus->bus.foreign},
+                       {"not_sent", bus->bus.not_sent}};
   for (const torsio::JointServer::JointStatus& joint : server.joints()) {
     JointJson refused = JointJson::object();
     for (std::size_t k = 1; k < joint.counts.refused.size(); ++k)
@@ -229,18 +247,24 @@ void run(const JointFlags& flags, const CLI::App& verb) {
   const double watchdog_s = torsio::si_quantity(flags.watchdog, "s", "--watchdog");
   ProgressBar progress;
   std::vector<torsio::ServedArm> arms = flags.served.arms(progress.listener());
+  const double can_rate_Hz = torsio::si_quantity(flags.can_rate, "Hz", "--can-rate");
+  if (verb.get_option("--can-rate")->count() > 0 && flags.line.can.empty())
+    throw torsio::UsageError({.place = "--can-rate", .expected = "--can", .found = "none"});
   const std::unique_ptr<torsio::LinkTransport> transport = flags.line.open(verb);
+  const std::unique_ptr<torsio::CanBus> can = flags.line.open_can();
   torsio::JointServer server(
       std::move(arms),
       {.watchdog_s = watchdog_s,
        .rules = flags.is_lenient ? torsio::NdlcomRules::lenient : torsio::NdlcomRules::strict,
        .has_gear_stage = flags.has_gear_stage,
-       .seed = flags.seed},
-      *transport);
+       .seed = flags.seed,
+       .can_rate_Hz = can_rate_Hz},
+      *transport, can.get());
   std::vector<std::string> start;
   for (const torsio::JointServer::JointStatus& joint : server.joints())
     start.push_back(fmt::format("joint {}: {}, {}, at {}", joint.id, joint.actuator, joint.model,
                                 server.line().place));
+  if (can != nullptr) start.push_back("CAN nodes with the same numbers at " + can->place());
   report_lines(flags, start);
   JointLoop loop(server, cycles);
   const Cycles done =
@@ -261,12 +285,16 @@ void add_joint(CLI::App& app) {
       "         torsio joint 1=dfki-300 2=dfki-120#03 --port 35001 --host-port 35000\n"
       "         torsio joint --arm arm6 --duration 60s --json run.json\n"
       "         torsio joint dfki-28 --unix /tmp/joint --fault 1:gear_angle=freeze@3s\n"
+      "         torsio joint dfki-50 --can udp_multicast --watchdog 1s\n"
       "Ctrl-C or SIGTERM stops the joints and prints a summary. docs/robot/joint.md has their "
       "behaviour.");
   flags->served.add(*verb);
   flags->line.add(*verb);
   verb->add_option("--watchdog", flags->watchdog,
                    "longest time without a motion command, 1 ms to 10 s")
+      ->capture_default_str();
+  verb->add_option("--can-rate", flags->can_rate,
+                   "rate of the cyclic CAN frames of position, current and torque; 0Hz: on request")
       ->capture_default_str();
   verb->add_flag("--lenient", flags->is_lenient,
                  "accept frames as the public parser of NDLCom does");

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <string_view>
 #include <utility>
@@ -58,6 +59,36 @@ void JointLineFlags::add(CLI::App& verb) {
   verb.add_option("--pty", pty, "PATH of a link to a new pseudo-terminal in place of UDP");
   verb.add_option("--baud", baud, "rate of the serial line or pseudo-terminal")
       ->capture_default_str();
+  verb.add_option(
+      "--can", can,
+      "udp_multicast[:GROUP[:PORT]] or socketcan:INTERFACE: the joints are also nodes of "
+      "this CAN bus, with the frames of ODrive's CANSimple; ids of 1 to 62");
+}
+
+std::unique_ptr<torsio::CanBus> JointLineFlags::open_can() const {
+  if (can.empty()) return nullptr;
+  const std::size_t colon = std::min(can.find(':'), can.size());
+  const std::string interface = can.substr(0, colon);
+  const std::string channel = colon < can.size() ? can.substr(colon + 1) : std::string();
+  if (interface == "socketcan" && !channel.empty()) return torsio::open_socketcan(channel);
+  if (interface != "udp_multicast")
+    throw torsio::UsageError({.place = "--can " + can,
+                              .expected = "udp_multicast, or socketcan with an interface",
+                              .found = "'" + can + "'",
+                              .advice = "As in --can udp_multicast:239.74.163.2:43113, or --can "
+                                        "socketcan:can0."});
+  torsio::CanMulticastSettings settings;
+  const std::size_t second = channel.find(':');
+  if (!channel.empty()) settings.group = channel.substr(0, second);
+  if (second != std::string::npos)
+    settings.port = static_cast<std::uint16_t>(whole_number(
+        std::string_view(channel).substr(second + 1), 65535, "--can " + can, "a port"));
+  for (const std::string& host : allowed) settings.allowed.push_back(peer_of(host, 1).address);
+  if (!allowed.empty())
+    remark(
+        "warning: the frames go to the local network, and whoever can send from an allowed address "
+        "can drive the joints: CAN has no authentication");
+  return torsio::open_can_multicast(settings);
 }
 
 std::unique_ptr<torsio::LinkTransport> JointLineFlags::open(const CLI::App& verb) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "torsio/core/progress.hpp"
+#include "torsio/link/can_bus.hpp"
 #include "torsio/link/link_transport.hpp"
 #include "torsio/sim/joints/joint_server.hpp"
 
@@ -20,10 +21,14 @@ struct JointLineFlags {
   std::string serial;
   std::string pty;
   double baud = torsio::SerialSettings{}.baud;
+  std::string can;  ///< INTERFACE:CHANNEL
 
   void add(CLI::App& verb);
   /// @throws torsio::UsageError for two lines at once, or an address beyond this machine without a list of hosts
   [[nodiscard]] std::unique_ptr<torsio::LinkTransport> open(const CLI::App& verb) const;
+  /// @returns null without --can
+  /// @throws torsio::UsageError for another interface than udp_multicast and socketcan
+  [[nodiscard]] std::unique_ptr<torsio::CanBus> open_can() const;
 };
 
 /// Which joints there are, and what happens to them.
