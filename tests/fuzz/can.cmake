@@ -1,0 +1,1 @@
+torsio_fuzzer(can torsio::link)
