@@ -8,7 +8,6 @@
 //   JointGroup       telemetry of several joints of one line at the same time, without control
 //   RegisterTable    parameters and measured values with unit, range and access
 //   NdlcomDecoder    frames of NDLCom from a stream of bytes; `encode_ndlcom` writes them
-//   CanSimpleNode    a joint on a CAN bus, with the frames of ODrive's CANSimple, beside its JointEndpoint
 
 #include "torsio/link/can_bus.hpp"
 #include "torsio/link/can_simple.hpp"

@@ -2,6 +2,8 @@
 
 // Start here to show joints in a browser, or to give their telemetry to programs of others. Needs libwebsockets.
 //
-//   WebServer   files from memory and WebSockets, in a thread of its own
+//   TelemetryPublisher   telemetry for PlotJuggler and Foxglove
+//   WebServer            files from memory and WebSockets, in a thread of its own
 
+#include "torsio/live/telemetry_publisher.hpp"
 #include "torsio/live/web_server.hpp"

@@ -369,6 +369,7 @@ int WebThread::confirm_upgrade(lws* connection, const char* what) {
       request.subprotocol = each;
   }
   if (const int status = objection(request, subprotocols); status != 0) {
+    call(settings_.on_refused, request, status);
     static_cast<void>(refuse_request(connection, static_cast<unsigned>(status)));
     return 1;
   }

@@ -125,7 +125,7 @@ class WebThread : public std::enable_shared_from_this<WebThread> {
   lws_context* context_ = nullptr;
   std::thread thread_ = {};
 
-  // Of the server's thread.
+  // Only the server's thread uses these.
   std::map<lws*, Session> sessions_ = {};
   std::map<lws*, WebRequest> upgrades_ = {};  ///< accepted, not yet open
   std::set<lws*> connections_ = {};

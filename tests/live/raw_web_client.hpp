@@ -11,9 +11,19 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 namespace torsio::test {
+
+/// Until `is_done()`, for half a minute at most. @returns whether it is
+template <class IsDone>
+bool wait_until(const IsDone& is_done) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!is_done() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  return is_done();
+}
 
 /// A client of HTTP and WebSocket of the bytes that a test gives it: also wrong and half ones.
 class RawWebClient {

@@ -22,18 +22,10 @@ namespace {
 
 using test::error_message;
 using test::RawWebClient;
+using test::wait_until;
 using testing::AllOf;
 using testing::HasSubstr;
 using ClientPointer = WebEndpoint::ClientPointer;
-
-/// Until `is_done()`, for half a minute at most. @returns whether it is
-template <class IsDone>
-bool wait_until(const IsDone& is_done) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-  while (!is_done() && std::chrono::steady_clock::now() < end)
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  return is_done();
-}
 
 /// A server that sends back what it receives.
 class WebServers : public testing::Test {

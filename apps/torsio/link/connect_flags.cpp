@@ -1,15 +1,51 @@
 #include "link/connect_flags.hpp"
 
 #include <CLI/Validators.hpp>
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string_view>
 
 #include "common/data_flags.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace {
 
 constexpr unsigned kHighestId = 254;
 
+std::optional<unsigned> id_of(std::string_view text) {
+  unsigned id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (error != std::errc{} || end != text.data() + text.size() || id < 1 || id > kHighestId)
+    return std::nullopt;
+  return id;
+}
+
 }  // namespace
+
+std::vector<std::uint8_t> joint_ids(const std::string& text) {
+  std::vector<std::uint8_t> ids;
+  const auto refuse = [&text] {
+    throw torsio::UsageError({.place = "--joints",
+                              .expected = "ids from 1 to 254, each once, such as 1,3,5-8",
+                              .found = text});
+  };
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string_view part = std::string_view(text).substr(begin, end - begin);
+    const std::size_t dash = part.find('-');
+    const auto first = id_of(part.substr(0, dash));
+    const auto last = dash == std::string_view::npos ? first : id_of(part.substr(dash + 1));
+    if (!first || !last || *first > *last) refuse();
+    for (unsigned id = *first; id <= *last; ++id) {
+      if (std::ranges::find(ids, id) != ids.end()) refuse();
+      ids.push_back(static_cast<std::uint8_t>(id));
+    }
+    begin = end + 1;
+  }
+  return ids;
+}
 
 void ConnectFlags::add_line(CLI::App& verb) {
   verb.add_option("--host", line.host, "IPv4 address of the joints")->capture_default_str();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,10 @@ struct ConnectFlags {
   [[nodiscard]] torsio::JointConnection connection() const;
 };
 
+/// The ids that a text names, each once and in its order: "1,3,5-8".
+/// @throws torsio::UsageError
+[[nodiscard]] std::vector<std::uint8_t> joint_ids(const std::string& text);
+
 // The verbs below `torsio connect` that are not in connect.cpp.
 
 void add_connect_watch(CLI::App& connect);
@@ -30,3 +35,4 @@ void add_connect_record(CLI::App& connect);
 void add_connect_play(CLI::App& connect);
 void add_connect_commands(CLI::App& connect);
 void add_connect_proxy(CLI::App& connect);
+void add_connect_publish(CLI::App& connect);  ///< only with libwebsockets (TORSIO_HAS_LIVE)

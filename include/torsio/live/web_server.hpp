@@ -19,9 +19,9 @@ using WebBuffer = std::shared_ptr<const std::vector<std::uint8_t>>;
 struct WebRequest {
   std::string path = {};         ///< "/live", decoded, without the query
   std::string query = {};        ///< "joint=1&rate=100", decoded; empty: none
-  std::string subprotocol = {};  ///< that of the endpoint
+  std::string subprotocol = {};  ///< the endpoint's
   std::string origin =
-      {};  ///< of the page that opens it, "http://localhost:8080"; empty: not a browser
+      {};  ///< address of the page that opens it, "http://localhost:8080"; empty: not a browser
   std::string host = {};  ///< the name by which the server was reached, "localhost:8080"
 };
 
@@ -68,7 +68,7 @@ struct WebFile {
 struct WebEndpoint {
   using ClientPointer = std::shared_ptr<WebClient>;
 
-  std::string subprotocol = {};  ///< of the header Sec-WebSocket-Protocol; each once
+  std::string subprotocol = {};  ///< value of Sec-WebSocket-Protocol; each once
   std::string path = {};         ///< at which it is; empty: at every path
   /// Pages of other origins that may open it: "https://app.foxglove.dev", or "*" for each. A page of this server always may, and
   /// so may programs that are not browsers and send no origin.
@@ -110,11 +110,13 @@ class WebServer {
     std::size_t clients = 64;                            ///< open WebSockets at the same time
     std::uint16_t header_limit_B = 8192;                 ///< all headers of a request
     int handshake_timeout_s = 5;  ///< for a request to be complete, and for an idle connection
-    int ping_period_s = 20;       ///< of an idle client, which is closed after three times as long
+    int ping_period_s = 20;  ///< while a client is idle; it is closed after three times as long
+    /// Is called in the server's thread for each refused WebSocket.
+    std::function<void(const WebRequest&, int status)> on_refused = {};
   };
   struct Counts {
     std::uint64_t opened = 0;     ///< WebSockets
-    std::uint64_t closed = 0;     ///< of these
+    std::uint64_t closed = 0;     ///< WebSockets that were opened
     std::uint64_t refused = 0;    ///< requests: host, origin, path, subprotocol, `accept`, too many
     std::uint64_t dropped = 0;    ///< clients for which too much was waiting
     std::uint64_t too_large = 0;  ///< clients that were closed for a message above the limit
@@ -125,8 +127,8 @@ class WebServer {
   };
 
   /// The server listens when it returns.
-  /// @throws Error if the address is not one, the port is in use or needs a privilege (with what to do), or a setting is out
-  /// of its range; if a path of a file or a subprotocol is given twice
+  /// @throws Error if the address is not one, the port is in use or needs a privilege (with what to do), or a setting is
+  /// beyond its limits; if a path of a file or a subprotocol is given twice
   explicit WebServer(Settings settings);
   /// Closes all clients, and waits until the thread has ended. Not in the server's thread.
   ~WebServer();
