@@ -12,8 +12,8 @@
 #include "link/can_node.hpp"
 
 // Any datagram is a frame of CAN 2.0 or refused, and any frame is taken: no number that is not finite or beyond its limits reaches
-// the joint. The data are datagrams of up to 255 bytes with their length before them; those that are no frame are also taken for
-// the id and the data of one.
+// the joint. The data are datagrams of up to 255 bytes, each with its length before it. One that is refused is also taken for the
+// command and the data of a frame.
 
 namespace {
 
