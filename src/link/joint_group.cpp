@@ -75,6 +75,7 @@ class JointGroup::Parts {
     bool is_silent = false;
   };
   [[nodiscard]] const std::vector<Member>& members() const noexcept { return members_; }
+  [[nodiscard]] std::vector<Member>& members() noexcept { return members_; }
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
 
  private:
@@ -114,6 +115,12 @@ std::size_t JointGroup::poll(const VisitTelemetry& visit, double wait_s) {
 
 std::size_t JointGroup::size() const noexcept { return parts_->members().size(); }
 std::uint8_t JointGroup::id(std::size_t joint) const { return parts_->settings().joints.at(joint); }
+JointConnection::Value JointGroup::read(std::size_t joint, std::string_view name) {
+  return parts_->members().at(joint).connection.read(name);
+}
+LinkDriveState JointGroup::state(std::size_t joint) {
+  return parts_->members().at(joint).connection.information().state;
+}
 const JointConnection::Information& JointGroup::information(std::size_t joint) const {
   return parts_->members().at(joint).information;
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/link/joint_connection.hpp"
@@ -55,6 +56,12 @@ class JointGroup {
 
   [[nodiscard]] std::size_t size() const noexcept;
   [[nodiscard]] std::uint8_t id(std::size_t joint) const;
+  /// The value of a register, and the state of the drive. Both wait for the reply of the joint; telemetry that arrives meanwhile
+  /// is stored for `poll`.
+  /// @throws Error if there is no reply, or no register of that name
+  [[nodiscard]] JointConnection::Value read(std::size_t joint, std::string_view name);
+  [[nodiscard]] LinkDriveState state(std::size_t joint);
+
   /// As it was at the start.
   [[nodiscard]] const JointConnection::Information& information(std::size_t joint) const;
   /// All that the joint has.

@@ -47,7 +47,8 @@ ArmJointModel arm_joint_model(const ModelFile& file, std::string_view place,
 }
 
 std::span<std::uint8_t> ModelUpload::begin(std::size_t size, std::string_view actuator) noexcept {
-  if (!is_at(Stage::free) || size > space_.size() || actuator != sheet_.name) return {};
+  const bool is_own = actuator == sheet_.name || actuator == full_name_;
+  if (!is_at(Stage::free) || size > space_.size() || !is_own) return {};
   return std::span(space_).first(size);
 }
 

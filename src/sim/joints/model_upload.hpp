@@ -26,10 +26,12 @@ class ModelUpload {
   static constexpr std::size_t kMaxBytes = std::size_t{4} << 20U;
 
   /// @param sheet outlives it
-  explicit ModelUpload(const DataSheet& sheet) : sheet_(sheet), space_(kMaxBytes) {}
+  explicit ModelUpload(const DataSheet& sheet)
+      : sheet_(sheet), full_name_(full_name(sheet)), space_(kMaxBytes) {}
 
   // By the thread of the loop.
 
+  /// @param actuator its type, with or without variant and serial number
   /// @returns space for a file of that size; empty if it is too large, for another actuator, or the one before is still checked
   [[nodiscard]] std::span<std::uint8_t> begin(std::size_t size,
                                               std::string_view actuator) noexcept TORSIO_REALTIME;
@@ -60,6 +62,7 @@ class ModelUpload {
   void check();
 
   const DataSheet& sheet_;
+  std::string full_name_;  ///< as the joint announces itself
   std::vector<std::uint8_t> space_;
   std::size_t size_ = 0;
   std::optional<ArmJointModel> model_ = {};
