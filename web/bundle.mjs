@@ -1,10 +1,13 @@
-// node bundle.mjs FOLDER: writes report.js and report.css from src/ into the folder.
+// node bundle.mjs FOLDER: writes report.js, report.css, live.js, live.css and live.html from src/ into the folder.
+import { copyFileSync } from "node:fs";
+import { join } from "node:path";
 import { build } from "esbuild";
 
+const web = import.meta.dirname ?? new URL(".", import.meta.url).pathname;
 await build({
-  absWorkingDir: import.meta.dirname ?? new URL(".", import.meta.url).pathname,
-  entryPoints: ["src/report.ts"],
-  outfile: `${process.argv[2]}/report.js`,
+  absWorkingDir: web,
+  entryPoints: ["src/report.ts", "src/live.ts"],
+  outdir: process.argv[2],
   bundle: true,
   minify: true,
   format: "iife",
@@ -12,3 +15,4 @@ await build({
   charset: "utf8",
   legalComments: "none",
 });
+copyFileSync(join(web, "src/live.html"), join(process.argv[2], "live.html"));

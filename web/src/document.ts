@@ -68,6 +68,8 @@ export interface TimeFigure {
   windows: Window[];
   marks: Mark[];
   panels: { label: string; series: TimeSeries[] }[];
+  /** Low panels, for an overview of many. */
+  compact?: boolean;
 }
 
 export type Figure = XyFigure | TimeFigure;

@@ -1,14 +1,15 @@
 import "./report.css";
-import { read_report } from "./document";
+import { read_report, slice } from "./document";
 import type { Figure, Report } from "./document";
+import { StoredSamples } from "./sample_source";
 import { make_rows_open, make_sortable } from "./sortable_table";
 import { add_theme_button } from "./theme";
 import { TimeView } from "./time_figure";
 import { XyView } from "./xy_figure";
 
 function draw(report: Report, figure: Figure, place: HTMLElement): void {
-  if (figure.kind === "time") new TimeView(place, report, figure);
-  else new XyView(place, report, figure);
+  if (figure.kind === "time") new TimeView(place, figure, (series) => new StoredSamples(report, figure, series));
+  else new XyView(place, figure, (numbers) => slice(report, numbers));
 }
 
 /** Figures are drawn when they come near the screen: the page opens at once. */

@@ -9,7 +9,7 @@ export interface Samples {
   complete: boolean;
 }
 
-/** Where a time figure takes its samples from: a report, or later a connection to a running loop. */
+/** Where a time figure takes its samples from: a report, or a connection to a running joint. */
 export interface SampleSource {
   readonly begin_s: number;
   readonly end_s: number;

@@ -1,13 +1,13 @@
 import uPlot from "uplot";
-import type { Mark, Report, TimeFigure, TimeSeries } from "./document";
+import type { Mark, TimeFigure, TimeSeries } from "./document";
 import { add_controls, add_legend, make_frame } from "./figure_frame";
 import type { Frame, LegendEntry, View } from "./figure_frame";
-import { StoredSamples } from "./sample_source";
 import type { SampleSource, Samples } from "./sample_source";
 import { css_colour, on_theme, series_colour, series_dash } from "./theme";
 
 const kFirstPanelHeight = 300;
 const kPanelHeight = 170;
+const kCompactHeight = 110;
 /** A measured curve can be seen below the model that follows it. */
 const kWidths: Record<string, number> = { measured: 3, lower: 0.5, upper: 0.5 };
 const kMaxPoints = 2000;
@@ -22,20 +22,23 @@ interface Panel {
 }
 
 /** Without NaN, which uPlot would draw: null is a gap. */
-function with_gaps(values: Float32Array): (number | null)[] {
-  return Array.from(values, (value) => (Number.isNaN(value) ? null : value));
+function with_gaps(values: Float32Array): Float32Array | (number | null)[] {
+  return values.some(Number.isNaN) ? Array.from(values, (value) => (Number.isNaN(value) ? null : value)) : values;
 }
 
 /** Panels of time series under each other, with one range of time. */
 export class TimeView implements View {
   private readonly frame: Frame;
   private readonly panels: Panel[] = [];
-  private readonly begin_s: number;
-  private readonly end_s: number;
   private view: [number, number];
   private is_waiting = false;
 
-  constructor(place: HTMLElement, report: Report, private readonly figure: TimeFigure) {
+  /** @param source_of the samples of the series of one panel */
+  constructor(
+    place: HTMLElement,
+    private readonly figure: TimeFigure,
+    source_of: (series: TimeSeries[]) => SampleSource,
+  ) {
     this.frame = make_frame(place, figure.title);
     const entries: (LegendEntry & { at: [panel: number, series: number][] })[] = [];
     const colours = new Map<string, number>();
@@ -49,12 +52,9 @@ export class TimeView implements View {
       });
     });
     figure.panels.forEach((panel, p) => {
-      const source = new StoredSamples(report, figure, panel.series);
       const plot = this.make_plot(panel.label, panel.series, colours, p);
-      this.panels.push({ plot, source, is_near: true, drawn: null });
+      this.panels.push({ plot, source: source_of(panel.series), is_near: true, drawn: null });
     });
-    this.begin_s = Math.min(...this.panels.map((panel) => panel.source.begin_s));
-    this.end_s = Math.max(...this.panels.map((panel) => panel.source.end_s));
     this.view = [this.begin_s, this.end_s];
     add_controls(this.frame, this);
     this.add_windows();
@@ -67,6 +67,13 @@ export class TimeView implements View {
     this.watch_panels();
     new ResizeObserver(() => this.resize()).observe(this.frame.canvas);
     on_theme(() => this.panels.forEach(({ plot }) => plot.redraw(false)));
+  }
+
+  private get begin_s(): number {
+    return Math.min(...this.panels.map((panel) => panel.source.begin_s));
+  }
+  private get end_s(): number {
+    return Math.max(...this.panels.map((panel) => panel.source.end_s));
   }
 
   zoom(factor: number): void {
@@ -98,6 +105,12 @@ export class TimeView implements View {
       this.is_waiting = false;
       this.update();
     });
+  }
+
+  /** Draws this range at once, also beyond the samples: that of a joint that is running. */
+  show_now(begin_s: number, end_s: number): void {
+    this.view = [begin_s, end_s];
+    this.update();
   }
 
   private update(): void {
@@ -145,13 +158,17 @@ export class TimeView implements View {
     });
   }
 
+  private height(index: number): number {
+    if (this.figure.compact) return kCompactHeight;
+    return index === 0 ? kFirstPanelHeight : kPanelHeight;
+  }
   private width(): number {
     return Math.max(this.frame.canvas.clientWidth, 280);
   }
 
   private resize(): void {
     this.panels.forEach(({ plot }, index) => {
-      if (plot.width !== this.width()) plot.setSize({ width: this.width(), height: panel_height(index) });
+      if (plot.width !== this.width()) plot.setSize({ width: this.width(), height: this.height(index) });
     });
   }
 
@@ -179,7 +196,7 @@ export class TimeView implements View {
     return new uPlot(
       {
         width: this.width(),
-        height: panel_height(index),
+        height: this.height(index),
         scales: { x: { time: false, auto: false } },
         legend: { show: false },
         cursor: {
@@ -228,13 +245,9 @@ function where_detail_ends(figure: TimeFigure): string {
         `elsewhere minima and maxima of ${figure.bucket} samples`;
 }
 
-function panel_height(index: number): number {
-  return index === 0 ? kFirstPanelHeight : kPanelHeight;
-}
-
-/** A model has one colour in all panels, and so has its error band. */
+/** A model has one colour in all panels, and so have its error band and its residual. */
 function colour_key(series: TimeSeries): string {
-  return series.label.replace(/ (lower|upper) bound$/, "");
+  return series.label.replace(/ (lower bound|upper bound|residual)$/, "");
 }
 
 function colour_index(colours: Map<string, number>, series: TimeSeries): number {

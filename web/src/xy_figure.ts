@@ -1,5 +1,4 @@
-import { slice } from "./document";
-import type { Report, XyFigure, XySeries } from "./document";
+import type { Numbers, XyFigure, XySeries } from "./document";
 import { add_controls, add_legend, make_frame } from "./figure_frame";
 import type { Frame, View } from "./figure_frame";
 import { Scale, scale_of } from "./scale";
@@ -39,17 +38,23 @@ export class XyView implements View {
   private y!: Scale;
   private width = 0;
   private height = 0;
+  private is_fitted = true;
 
-  constructor(place: HTMLElement, report: Report, private readonly figure: XyFigure) {
+  /** @param numbers_of the numbers of a series */
+  constructor(
+    place: HTMLElement,
+    private readonly figure: XyFigure,
+    numbers_of: (numbers: Numbers) => Float32Array,
+  ) {
     this.frame = make_frame(place, figure.title);
     let models = 0;
     this.drawn = figure.series.map((series) => {
       const index = series.role === "model" ? models++ : 0;
       return {
         series,
-        x: slice(report, series.x),
-        y: slice(report, series.y),
-        colour: series.colour ? slice(report, series.colour) : null,
+        x: numbers_of(series.x),
+        y: numbers_of(series.y),
+        colour: series.colour ? numbers_of(series.colour) : null,
         shown: series.shown,
         css: series_colour(series.role, index),
         dash: series.role === "limit" ? [4, 4] : series_dash(index),
@@ -78,17 +83,26 @@ export class XyView implements View {
   }
 
   zoom(factor: number): void {
+    this.is_fitted = false;
     this.x.zoom(factor);
     this.y.zoom(factor);
     this.draw();
   }
   pan(right: number, up: number): void {
+    this.is_fitted = false;
     this.x.pan(right);
     this.y.pan(up);
     this.draw();
   }
   reset(): void {
+    this.is_fitted = true;
     this.fit();
+    this.draw();
+  }
+  /** Replaces the points of all series; the axes contain all points unless a person has zoomed. */
+  replace(points: [x: Float32Array, y: Float32Array][]): void {
+    points.forEach(([x, y], index) => Object.assign(this.drawn[index], { x, y }));
+    if (this.is_fitted) this.fit();
     this.draw();
   }
 
@@ -134,6 +148,7 @@ export class XyView implements View {
       start = null;
       box?.remove();
       if (Math.abs(x - x0) < 8 || Math.abs(y - y0) < 8) return;
+      this.is_fitted = false;
       this.x.show(this.share_x(Math.min(x, x0)), this.share_x(Math.max(x, x0)));
       this.y.show(this.share_y(Math.max(y, y0)), this.share_y(Math.min(y, y0)));
       this.draw();
