@@ -195,6 +195,7 @@ void add_connect(CLI::App& app) {
   add_connect_play(*verb);
   add_connect_commands(*verb);
 #ifdef TORSIO_HAS_LIVE
+  add_connect_page(*verb);
   add_connect_publish(*verb);
 #endif
   add_connect_proxy(*verb);

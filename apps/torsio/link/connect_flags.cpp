@@ -70,6 +70,20 @@ void ConnectFlags::add_line(CLI::App& verb) {
                   "write the result as JSON to a file, or - for standard output");
 }
 
+void ConnectFlags::add_bridge(CLI::App& verb) {
+  verb.add_option(
+          "--bridge", bridge,
+          "longest gap of samples that did not arrive which is bridged by straight lines; 0s: none")
+      ->capture_default_str();
+}
+
+double ConnectFlags::bridge_s() const {
+  const double longest_s = torsio::si_quantity(bridge, "s", "--bridge");
+  if (!(longest_s >= 0.0) || longest_s > 1.0)
+    throw torsio::UsageError({.place = "--bridge", .expected = "0s to 1s", .found = bridge});
+  return longest_s;
+}
+
 void ConnectFlags::add(CLI::App& verb) {
   verb.add_option("--joint", joint, "id of the joint")
       ->check(CLI::Range(1U, kHighestId))

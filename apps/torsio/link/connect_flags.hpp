@@ -17,6 +17,11 @@ struct ConnectFlags {
   bool is_lenient = false;
   JsonOutput json = {};
 
+  std::string bridge = "10ms";
+
+  /// For what is recorded.
+  void add_bridge(CLI::App& verb);
+  [[nodiscard]] double bridge_s() const;
   /// All but `--joint`.
   void add_line(CLI::App& verb);
   void add(CLI::App& verb);
@@ -34,5 +39,6 @@ void add_connect_watch(CLI::App& connect);
 void add_connect_record(CLI::App& connect);
 void add_connect_play(CLI::App& connect);
 void add_connect_commands(CLI::App& connect);
+void add_connect_page(CLI::App& connect);
 void add_connect_proxy(CLI::App& connect);
 void add_connect_publish(CLI::App& connect);  ///< only with libwebsockets (TORSIO_HAS_LIVE)

@@ -217,7 +217,11 @@ void run(const PlayFlags& flags) {
   const PlayedReferences references(recordings.front(), flags.mode);
   JointConnection joint = flags.connection();
   std::optional<TelemetryFile> file;
-  if (!flags.output.empty()) file.emplace(joint, std::vector<std::string>{}, 1000.0, flags.output);
+  if (!flags.output.empty()) {
+    TelemetryFile::check(flags.output);
+    file.emplace(joint.subscribe(TelemetryFile::recorded(joint.channels()), 1000.0), flags.output,
+                 flags.bridge_s());
+  }
   const auto visit = [&](const torsio::LinkTelemetry& telemetry) {
     if (file) file->add(telemetry);
   };
@@ -226,7 +230,7 @@ void run(const PlayFlags& flags) {
   lift_interrupt_deadline();
   stop_and_disable(joint, visit);
   report(flags, joint, played, references.mode());
-  if (file) file->close();
+  if (file) remark(text_of(flags.output, file->close()));
 }
 
 }  // namespace
@@ -253,6 +257,7 @@ void add_connect_play(CLI::App& connect) {
   verb->add_option("--valid", flags->valid,
                    "age after which the joint refuses a reference, and stops without another")
       ->capture_default_str();
+  flags->add_bridge(*verb);
   flags->add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -117,19 +117,21 @@ void watch(const TelemetryFlags& flags) {
 
 void record(const TelemetryFlags& flags) {
   JointConnection joint = flags.connection();
-  TelemetryFile file(joint, flags.channels, flags.rate_Hz(), flags.output);
+  TelemetryFile::check(flags.output);
+  TelemetryFile file(
+      joint.subscribe(
+          flags.channels.empty() ? TelemetryFile::recorded(joint.channels()) : flags.channels,
+          flags.rate_Hz()),
+      flags.output, flags.bridge_s());
   receive(joint, flags.duration_s(), [&](double, const torsio::LinkTelemetry& telemetry) {
     file.add(telemetry);
     return !file.has_dropped();
   });
-  const TelemetryFile::Summary summary = file.close();
-  remark(fmt::format("{}: {} samples of {} channels at {:g} Hz{}", flags.output,
-                     summary.frames + summary.missing, summary.channels.size(), summary.rate_Hz,
-                     summary.missing == 0 ? std::string()
-                                          : fmt::format(", {} of which did not arrive, and are nan",
-                                                        summary.missing)));
+  const TelemetrySummary summary = file.close();
+  remark(text_of(flags.output, summary));
   flags.json.write(torsio::json_text(Json{{"samples", summary.frames + summary.missing},
                                           {"missing", summary.missing},
+                                          {"bridged", summary.bridged},
                                           {"channels", summary.channels},
                                           {"sample_rate_Hz", summary.rate_Hz}}));
 }
@@ -158,5 +160,6 @@ void add_connect_record(CLI::App& connect) {
                                torsio::kRecordingEndings))
       ->required();
   flags->add_telemetry(*verb, "1000Hz");
+  flags->add_bridge(*verb);
   verb->callback([flags] { record(*flags); });
 }

@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "common/output.hpp"
+#include "link/lost_samples.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/recording_blocks.hpp"
@@ -15,9 +17,29 @@ namespace {
 
 constexpr std::string_view kRecorderEnding = ".tsr";
 
-std::vector<std::string> channels_with_unit(const std::vector<std::string>& all) {
+}  // namespace
+
+std::string text_of(const std::string& path, const TelemetrySummary& summary) {
+  std::string text =
+      fmt::format("{}: {} samples of {} channels at {:g} Hz", path,
+                  summary.frames + summary.missing, summary.channels.size(), summary.rate_Hz);
+  if (summary.missing == 0) return text;
+  text += fmt::format(", {} of which did not arrive", summary.missing);
+  const std::size_t left = summary.missing - summary.bridged;
+  if (summary.bridged == 0) return text + ", and are nan";
+  text += fmt::format(": {} are bridged", summary.bridged);
+  if (left > 0) text += fmt::format(", {} in longer gaps are nan", left);
+  return text;
+}
+
+void TelemetryFile::check(const std::string& path) {
+  require_ending("--output", path, {".csv", ".gz", ".mcap", ".npz", ".mat", kRecorderEnding});
+  require_writable(path);
+}
+
+std::vector<std::string> TelemetryFile::recorded(const std::vector<std::string>& channels) {
   std::vector<std::string> found;
-  for (const std::string& each : all) {
+  for (const std::string& each : channels) {
     const auto parts = torsio::split_channel_name(each);
     if (parts && parts->si() == each)
       found.push_back(each);
@@ -27,16 +49,12 @@ std::vector<std::string> channels_with_unit(const std::vector<std::string>& all)
   return found;
 }
 
-}  // namespace
-
-TelemetryFile::TelemetryFile(torsio::JointConnection& joint,
-                             const std::vector<std::string>& channels, double rate_Hz,
-                             const std::string& path)
-    : path_(path), recorded_(path.ends_with(kRecorderEnding) ? path : path + ".tsr") {
-  require_ending("--output", path, {".csv", ".gz", ".mcap", ".npz", ".mat", kRecorderEnding});
-  require_writable(path);
-  subscription_ =
-      joint.subscribe(channels.empty() ? channels_with_unit(joint.channels()) : channels, rate_Hz);
+TelemetryFile::TelemetryFile(torsio::JointConnection::Subscription subscription,
+                             const std::string& path, double bridge_s)
+    : path_(path),
+      bridge_s_(bridge_s),
+      recorded_(path.ends_with(kRecorderEnding) ? path : path + ".tsr"),
+      subscription_(std::move(subscription)) {
   recorder_ = std::make_unique<torsio::Recorder>(
       recorded_, torsio::RecorderOptions{.channels = subscription_.channels,
                                          .period_s = 1.0 / subscription_.rate_Hz});
@@ -54,12 +72,12 @@ void TelemetryFile::add(const torsio::LinkTelemetry& telemetry) {
   static_cast<void>(recorder_->push(tick, values_));
 }
 
-TelemetryFile::Summary TelemetryFile::close() {
+TelemetrySummary TelemetryFile::close() {
   const torsio::RecorderReport report = recorder_->close();
-  Summary summary{.frames = report.frames,
-                  .missing = static_cast<std::size_t>(last_tick_ + 1) - report.frames,
-                  .channels = subscription_.channels,
-                  .rate_Hz = subscription_.rate_Hz};
+  TelemetrySummary summary{.frames = report.frames,
+                           .missing = static_cast<std::size_t>(last_tick_ + 1) - report.frames,
+                           .channels = subscription_.channels,
+                           .rate_Hz = subscription_.rate_Hz};
   if (!report.trouble.empty())
     throw torsio::Error(
         {.place = recorded_,
@@ -74,7 +92,10 @@ TelemetryFile::Summary TelemetryFile::close() {
   }
   if (recorded_ == path_) return summary;
   try {
-    torsio::write_recording(torsio::read_recording_blocks(recorded_).recording, path_);
+    const BridgedRecording bridged =
+        bridge_lost_samples(torsio::read_recording_blocks(recorded_).recording, bridge_s_);
+    torsio::write_recording(bridged.recording, path_);
+    summary.bridged = bridged.bridged;
   } catch (const torsio::Error& error) {
     torsio::ErrorReport again = error.report();
     again.advice = fmt::format("The recording is in {0}: `torsio unpack {0} -o {1}` converts it.",
