@@ -95,7 +95,8 @@ Layers layers() {
                  {"files", {"runtime"}},
                  {"realtime", {"runtime"}},
                  {"arm", {"files", "runtime"}},
-                 {"link", {"runtime"}}};
+                 {"link", {"runtime"}},
+                 {"live", {"link", "runtime"}}};
   const std::string cmake = file_bytes(kRoot / "src/CMakeLists.txt");
   const std::regex library(R"(torsio_slow_library\((\w+)\s[^)]*?USES ([a-z ]+))");
   for (std::sregex_iterator at(cmake.begin(), cmake.end(), library); at != std::sregex_iterator();

@@ -1,6 +1,6 @@
 # cmake -DBUILD=<build tree> -DSOURCE=<tests/install/stranger> -DWORK=<scratch> -P install_test.cmake
-# Installs torsio into a scratch prefix, builds seven strangers' projects against it (one without the lab, one with it, one
-# that fits models, one with a real-time loop, one with an arm, one with a link, one in C where libtorsio.so is built) and runs them.
+# Installs torsio into a scratch prefix, builds eight strangers' projects against it (one without the lab, one with it, one
+# that fits models, one with a real-time loop, one with an arm, one with a link, one that publishes where libwebsockets is installed, one in C where libtorsio.so is built) and runs them.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -37,6 +37,14 @@ run(${CMAKE_COMMAND} --build ${WORK}/build_link)
 run(${WORK}/build_link/stranger_with_a_link)
 if(NOT output MATCHES "a ping of [0-9]+ bytes")
   message(FATAL_ERROR "the stranger's link printed: ${output}")
+endif()
+if(EXISTS ${WORK}/prefix/include/torsio/live)
+  run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_who_publishes -B ${WORK}/build_live -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+  run(${CMAKE_COMMAND} --build ${WORK}/build_live)
+  run(${WORK}/build_live/stranger_who_publishes)
+  if(NOT output MATCHES "1 sample at port [1-9][0-9]+")
+    message(FATAL_ERROR "the stranger's publisher printed: ${output}")
+  endif()
 endif()
 set(torsio ${WORK}/prefix/bin/torsio)
 run(${WORK}/build_realtime/stranger_in_real_time ${WORK}/run.tsr)

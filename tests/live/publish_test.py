@@ -194,7 +194,8 @@ class Publish(unittest.TestCase):
                 if topic == topics[5] and n is not None:
                     found[time_us] = n
         self.assertGreater(len(found), 100)
-        self.assertEqual(len({round(time_us / 1000) - n for time_us, n in found.items()}), 1)
+        shifts = {round(time_us / 1000) - n for time_us, n in found.items()}
+        self.assertLessEqual(max(shifts) - min(shifts), 1)  # rounding of a late cycle
         sent = json.loads((self.folder / "sent.json").read_text())
         self.assertEqual(sent["clients"], 2)
         self.assertEqual(sent["dropped"], 0)
