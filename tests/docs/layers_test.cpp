@@ -91,12 +91,9 @@ Layers layers() {
     for (const std::string& folder : matches(cells[1].str(), "`([^`]+)`"))
       layers.folders[folder] = {.row = row, .library = cells[2].str()};
   }
-  layers.uses = {{"runtime", {}},
-                 {"files", {"runtime"}},
-                 {"realtime", {"runtime"}},
-                 {"arm", {"files", "runtime"}},
-                 {"link", {"runtime"}},
-                 {"live", {"link", "runtime"}}};
+  layers.uses = {{"runtime", {}},           {"files", {"runtime"}},
+                 {"realtime", {"runtime"}}, {"arm", {"files", "runtime"}},
+                 {"link", {"runtime"}},     {"live", {"link", "runtime"}}};
   const std::string cmake = file_bytes(kRoot / "src/CMakeLists.txt");
   const std::regex library(R"(torsio_slow_library\((\w+)\s[^)]*?USES ([a-z ]+))");
   for (std::sregex_iterator at(cmake.begin(), cmake.end(), library); at != std::sregex_iterator();
