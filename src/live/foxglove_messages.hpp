@@ -9,7 +9,7 @@
 
 namespace torsio {
 
-/// Messages of Foxglove's WebSocket protocol, version 1. Source: github.com/foxglove/ws-protocol, docs/spec.md.
+/// Messages of Foxglove's WebSocket protocol, version 1. Source: the specification in github.com/foxglove/ws-protocol.
 namespace foxglove {
 
 inline constexpr std::string_view kSubprotocol = "foxglove.websocket.v1";

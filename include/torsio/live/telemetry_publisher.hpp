@@ -25,7 +25,7 @@ namespace torsio {
 ///
 /// No function waits for a receiver. For one thread.
 ///
-/// Source: github.com/foxglove/ws-protocol, docs/spec.md, and the message layouts of version 1 of github.com/foxglove/foxglove-sdk
+/// Source: the specification in github.com/foxglove/ws-protocol, and the message layouts of version 1 of github.com/foxglove/foxglove-sdk
 /// (formats only; the code is our own). docs/robot/publish.md
 class TelemetryPublisher {
  public:
