@@ -7,7 +7,6 @@
 //   JointConnection  the host's side for programs of a person: calls that wait for the reply, by names of registers
 //   JointGroup       telemetry of several joints of one line at the same time, without control
 //   RegisterTable    parameters and measured values with unit, range and access
-//   NdlcomDecoder    frames of NDLCom from a stream of bytes; `encode_ndlcom` writes them
 
 #include "torsio/link/can_bus.hpp"
 #include "torsio/link/can_simple.hpp"
