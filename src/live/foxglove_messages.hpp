@@ -7,10 +7,8 @@
 #include <variant>
 #include <vector>
 
-namespace torsio {
-
 /// Messages of Foxglove's WebSocket protocol, version 1. Source: the specification in github.com/foxglove/ws-protocol.
-namespace foxglove {
+namespace torsio::foxglove {
 
 inline constexpr std::string_view kSubprotocol = "foxglove.websocket.v1";
 /// Another name of the same messages, by which newer versions of Foxglove ask first.
@@ -49,5 +47,4 @@ struct Mistake {
 /// What a client sends as text. Whatever it is, there is no exception.
 [[nodiscard]] std::variant<Subscribe, Unsubscribe, Mistake> client_message(std::string_view text);
 
-}  // namespace foxglove
-}  // namespace torsio
+}  // namespace torsio::foxglove

@@ -25,7 +25,7 @@ constexpr std::string_view kPath = "/live";
 /// What is not sent within this time is not shown any more.
 constexpr double kLongestBlock_s = 1.0;
 /// A page that asks more often than a person does.
-constexpr std::size_t kMostRequests = 64;
+constexpr std::size_t kMaxRequests = 64;
 constexpr int kForbidden = 403;
 /// A hysteresis loop.
 constexpr std::string_view kIcon =
@@ -192,7 +192,7 @@ class LivePage::Parts {
     if (page_ != client) return;
     const Json message = Json::parse(text, nullptr, false);
     const std::optional<Request> request = request_of(message);
-    if (!request || requests_.size() >= kMostRequests) {
+    if (!request || requests_.size() >= kMaxRequests) {
       ++refused_;
       return;
     }

@@ -25,7 +25,7 @@ std::string TelemetryJson::text_of(std::span<const float> values) const {
     if (!std::isfinite(values[k])) continue;
     if (text.size() > 1) text += ',';
     text += keys_[k];
-    const auto end =
+    char* const end =
         std::to_chars(digits.data(), digits.data() + digits.size(), double{values[k]}).ptr;
     text.append(digits.data(), end);
   }
@@ -41,8 +41,8 @@ std::string TelemetryJson::schema() const {
 
 std::string plotjuggler_text(std::string_view joint, std::uint64_t time_us,
                              std::string_view values) {
-  constexpr std::uint64_t kSecond_us = 1'000'000;
-  return fmt::format("{{\"timestamp\":{}.{:06},{}:{}}}", time_us / kSecond_us, time_us % kSecond_us,
+  constexpr std::uint64_t kPerSecond = 1'000'000;
+  return fmt::format("{{\"timestamp\":{}.{:06},{}:{}}}", time_us / kPerSecond, time_us % kPerSecond,
                      quoted_json(joint), values);
 }
 

@@ -9,10 +9,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include "core/checks.hpp"
+#include "link/descriptor.hpp"
 #include "live/web_request.hpp"
 
 namespace torsio {
@@ -65,10 +65,8 @@ std::uint16_t try_to_listen(const WebServer::Settings& settings) {
   const int error_number = errno;
   ::close(listener);
   if (!listens)
-    throw Error({.place = place,
-                 .problem = "the web server cannot listen",
-                 .found = std::strerror(error_number),
-                 .advice = address_advice(settings, error_number)});
+    detail::refuse_system(place, "the web server cannot listen", error_number,
+                          address_advice(settings, error_number));
   return ntohs(address.sin_port);
 }
 

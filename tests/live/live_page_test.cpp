@@ -166,10 +166,10 @@ TEST(LivePages, AreRefusedWithoutTheTokenAndToOtherOrigins) {
             101);
 }
 
-TEST(LivePages, AreToldTheJointsAndGetTheirSamples) {
+TEST(LivePages, ReceiveTheJointsAndTheirSamples) {
   LivePage page(two_joints());
   page.add(0, 0, std::vector{1.0, 2.0, 3.0, 4.0});
-  page.flush();  // to nobody
+  page.flush();  // no page is connected
   RawWebClient client(port_of(page));
   ASSERT_EQ(client.open(with_token("secret")), 101);
   const auto welcome = client.frame();

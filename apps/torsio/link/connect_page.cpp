@@ -244,7 +244,7 @@ class PageLoop {
     }
   }
 
-  /// Of one joint after the other, so that a slow reply delays no picture for long.
+  /// The joints are asked one after the other, so that a slow reply delays no picture for long.
   void read_state(std::size_t j) {
     if (group_.is_silent(j)) return;
     PageJoint& joint = joints_[j];
@@ -306,7 +306,8 @@ void add_connect_page(CLI::App& connect) {
       "page", "show joints in a browser: time series, hysteresis loop, estimates, recordings");
   verb->footer(
       "Example: torsio connect page --joints 1-6 --model joint.safetensors\n"
-      "It prints the address of the page, which contains a token: whoever has it sees the joints, "
+      "It prints the address of the page, which contains a token: whoever has it can look at the "
+      "joints, "
       "records "
       "them, and turns models on and off. The page does not move a joint.");
   verb->add_option("--joints", flags->joints, "ids of the joints: 1,3,5-8")->capture_default_str();

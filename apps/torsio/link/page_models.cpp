@@ -83,7 +83,7 @@ std::vector<bool> PageModels::are_on() const {
 
 void PageModels::switch_model(std::size_t model, bool is_on) {
   Running& each = running_.at(model);
-  // What it remembers is from before it was turned off.
+  // Its state is from before it was turned off.
   if (is_on && !each.is_on) each.estimator.reset();
   each.is_on = is_on;
 }

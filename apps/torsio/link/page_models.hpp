@@ -13,7 +13,7 @@
 class PageModels {
  public:
   /// @param joint for messages @param channels of the telemetry, at `rate_Hz`
-  /// @throws torsio::Error for a file that is no model, or one for another rate; what the joint does not measure is a remark, and
+  /// @throws torsio::Error for a file that is not a model, or one for another rate; what the joint does not measure is a remark, and
   /// that model is left out.
   PageModels(const std::vector<std::string>& files, const std::string& joint,
              const std::vector<std::string>& channels, double rate_Hz);
@@ -30,7 +30,7 @@ class PageModels {
     std::string name;
     torsio::Estimator estimator;
     std::vector<std::size_t>
-        channels;  ///< of the raw inputs; kDeflection: gear angle less joint angle
+        channels;  ///< channels of the raw inputs; kDeflection: gear angle less joint angle
     std::vector<double> raw;
     bool is_on = true;
   };

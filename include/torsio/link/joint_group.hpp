@@ -44,8 +44,8 @@ class JointGroup {
   /// @throws Error also if the line cannot be opened
   JointGroup(const JointLine& line, const Settings& settings);
   ~JointGroup();
-  JointGroup(JointGroup&&) noexcept;
-  JointGroup& operator=(JointGroup&&) noexcept;
+  JointGroup(JointGroup&& other) noexcept;
+  JointGroup& operator=(JointGroup&& other) noexcept;
 
   /// Telemetry of these channels, of all if there are none, from every joint; the last call holds.
   /// @throws Error that names the joint which does not have a channel, or refuses

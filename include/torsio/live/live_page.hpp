@@ -11,18 +11,18 @@
 
 namespace torsio {
 
-/// A page on this machine that shows what joints do, in a browser: time series, the hysteresis loop, estimates with their error
-/// bars beside the measured torque. A thread of its own serves it; nothing that a browser does, or does not do, slows a caller.
+/// A page on this machine that shows what joints do, in a browser: time series, the hysteresis loop, estimates with their standard
+/// deviations beside the measured torque. A thread of its own serves it; nothing that a browser does, or does not do, slows a caller.
 ///
 ///     LivePage page({.rate_Hz = 1000.0, .joints = {{.id = 1, .name = "joint", .channels = {"torque_Nm"}}}});
 ///     std::puts(page.url().c_str());
 ///     while (...) {
-///       page.add(0, sample, values);                         // 1000 times a second
-///       page.flush();                                        // 60 times a second
+///       page.add(0, sample, values);                         // at rate_Hz
+///       page.flush();                                        // at 60 Hz
 ///       for (const LivePage::Request& each : page.take_requests()) ...
 ///     }
 ///
-/// Who has the token of the URL sees the page and can make requests; pages of other origins are refused, also with the token.
+/// Whoever has the token of the URL can open the page and make requests; pages of other origins are refused, also with the token.
 /// One page is connected at a time: a second one is refused with the reason, and shows it.
 class LivePage {
  public:
@@ -54,12 +54,12 @@ class LivePage {
   struct Request {
     enum class Kind : std::uint8_t { begin_recording, end_recording, switch_model };
     Kind kind = Kind::begin_recording;
-    std::size_t joint = 0;  ///< of the model
+    std::size_t joint = 0;  ///< index of the joint with the model
     std::size_t model = 0;
     bool is_on = false;
   };
   struct JointStatus {
-    std::string state = {};    ///< of the drive
+    std::string state = {};    ///< state of the drive
     std::string monitor = {};  ///< empty: unknown
     bool is_silent = false;
     std::uint64_t lost = 0;         ///< samples
@@ -74,7 +74,7 @@ class LivePage {
     std::uint64_t pages = 0;  ///< that were connected
     std::uint64_t refused =
         0;  ///< a wrong token, another page, a message that is not one of the page
-    std::uint64_t messages_B = 0;  ///< of samples, given to the server
+    std::uint64_t messages_B = 0;  ///< messages with samples, given to the server
     WebServer::Counts server = {};
   };
 
