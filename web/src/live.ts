@@ -20,6 +20,7 @@ class LivePage {
   private has_new_samples = false;
   private is_stopped = false;
   private pictures = 0;
+  private drawing_ms = 0;
   private width_s = 10;
 
   constructor() {
@@ -102,13 +103,17 @@ class LivePage {
     if (this.is_stopped || !this.has_new_samples) return;
     this.has_new_samples = false;
     this.pictures += 1;
+    const begin_ms = performance.now();
     for (const joint of this.joints) joint.draw(this.width_s);
+    this.drawing_ms += performance.now() - begin_ms;
   }
 
   private count_pictures(): void {
     by_id("pictures").textContent = `${this.pictures} pictures a second`;
     document.body.dataset.pictures = String(this.pictures);
+    document.body.dataset.drawing = (this.drawing_ms / Math.max(this.pictures, 1)).toFixed(1);
     this.pictures = 0;
+    this.drawing_ms = 0;
   }
 }
 

@@ -7,6 +7,7 @@ import { XyView } from "./xy_figure";
 
 /** Longest range of time that a figure can show. */
 const kKept_s = 60;
+const kAnswer_ms = 1000;
 const kLoopPoints = 600;
 const kDeflection = "spring_deflection_rad";
 
@@ -45,6 +46,8 @@ export class LiveJointView {
   private readonly loop: XyView | null;
   private readonly state = document.createElement("p");
   private readonly toggles: HTMLInputElement[] = [];
+  /** Until then what a person has chosen holds, since an older status may still arrive. */
+  private readonly chosen_until_ms: number[] = [];
   private is_near = true;
 
   /** @param reference channel of the torque that was measured; null: there is none */
@@ -120,7 +123,9 @@ export class LiveJointView {
     ];
     this.state.textContent = words.join("; ");
     this.state.classList.toggle("warning", status.silent);
-    status.models.forEach((on, i) => (this.toggles[i].checked = on));
+    status.models.forEach((on, i) => {
+      if (performance.now() > this.chosen_until_ms[i]) this.toggles[i].checked = on;
+    });
     this.place.dataset.models = status.models.join(" ");
   }
 
@@ -138,7 +143,11 @@ export class LiveJointView {
     group.append(Object.assign(document.createElement("legend"), { textContent: "models" }));
     this.joint.models.forEach(({ name, on }, i) => {
       const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
-      box.addEventListener("change", () => switch_model(i, box.checked));
+      box.addEventListener("change", () => {
+        this.chosen_until_ms[i] = performance.now() + kAnswer_ms;
+        switch_model(i, box.checked);
+      });
+      this.chosen_until_ms.push(0);
       const label = document.createElement("label");
       label.append(box, ` ${name}`);
       group.append(label);

@@ -129,9 +129,10 @@ export class TimeView implements View {
     }
     this.frame.canvas.dataset.range = `${begin} ${end}`;
     if (!shown) return;
-    this.frame.note.textContent = shown.complete
+    const note = shown.complete
       ? "Every sample is shown."
       : `Lines show minima and maxima; ${where_detail_ends(this.figure)}.`;
+    if (this.frame.note.textContent !== note) this.frame.note.textContent = note;
   }
 
   private hide_empty_panels(): void {

@@ -1,11 +1,56 @@
-// node live.mjs URL SECONDS: opens the page of `torsio connect page` in headless Chromium and uses it as a person does. Prints
-// JSON with the pictures of each second. CHROMIUM: the browser's program.
+// node live.mjs TORSIO [JOINTS [SECONDS]]: opens the page of `torsio connect page` with simulated joints in headless Chromium and
+// uses it as a person does. Prints the pictures of each second and the CPU time of the program. CHROMIUM: the browser's program.
+import { spawn, spawnSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
 import { chromium } from "playwright-core";
 
-const [url, seconds] = process.argv.slice(2);
+const torsio = resolve(process.argv[2]);
+const joint_count = Number(process.argv[3] ?? 12);
+const seconds = Number(process.argv[4] ?? 10);
+const folder = mkdtempSync(join(tmpdir(), "torsio-page-"));
+const line = ["--port", "37001", "--host-port", "37000"];
+const kTicksPerSecond = 100; // of /proc/PID/stat
 const problems = [];
 function expect(condition, what) {
   if (!condition) problems.push(what);
+}
+
+function must(...command) {
+  const done = spawnSync(torsio, command, { cwd: folder, encoding: "utf8" });
+  if (done.status !== 0) throw new Error(`torsio ${command.join(" ")}\n${done.stderr}`);
+}
+must("simulate", "dfki-50", "sweep", "--duration", "20s", "--seed", "1", "-o", "sweep.csv");
+must("fit", "sweep.csv", "--model", "linear_coulomb", "--inputs",
+  "spring_deflection_rad, lowpass(rate(spring_deflection_rad), 10Hz)", "-o", "model.safetensors");
+const joints_program = spawn(torsio, ["joint", ...Array(joint_count).fill("dfki-50"), ...line, "--watchdog", "1s"], { cwd: folder });
+await new Promise((done) => setTimeout(done, 1500));
+const page_program = spawn(
+  torsio,
+  ["connect", "page", "--joints", `1-${joint_count}`, ...line, "--model", "model.safetensors", "--json", "page.json"],
+  { cwd: folder },
+);
+process.on("exit", () => {
+  page_program.kill("SIGKILL");
+  joints_program.kill("SIGKILL");
+});
+let printed = "";
+page_program.stderr.on("data", (text) => (printed += text));
+const url = await new Promise((found, failed) => {
+  const deadline = setTimeout(() => failed(new Error(`no address was printed: ${printed}`)), 10_000);
+  const look = setInterval(() => {
+    const match = printed.match(/http:\S+/);
+    if (!match) return;
+    clearInterval(look);
+    clearTimeout(deadline);
+    found(match[0]);
+  }, 20);
+});
+/** CPU time of the program in seconds. */
+function cpu_s() {
+  const fields = readFileSync(`/proc/${page_program.pid}/stat`, "utf8").split(") ")[1].split(" ");
+  return (Number(fields[11]) + Number(fields[12])) / kTicksPerSecond;
 }
 
 const browser = await chromium.launch({
@@ -22,7 +67,7 @@ page.on("console", (message) => {
 await page.goto(url);
 await page.waitForFunction(() => document.getElementById("connection").textContent.startsWith("Connected"), null, { timeout: 5000 });
 const joints = await page.locator("section").count();
-expect(joints > 0, "no joint is shown");
+expect(joints === joint_count, `${joints} joints are shown`);
 
 // Figures move.
 const range = async () => (await page.locator(".canvas[data-range]").first().getAttribute("data-range")).split(" ").map(Number);
@@ -72,19 +117,46 @@ await page.waitForTimeout(1500);
 await page.getByRole("button", { name: "End the recording" }).click();
 await page.getByRole("button", { name: "Record", exact: true }).waitFor();
 
+// Pages of others.
+const other = await context.newPage();
+await other.goto(url.replace(/token=.*/, "token=wrong"));
+await other.waitForFunction(() => document.getElementById("connection").textContent.startsWith("Not connected"));
+await other.close();
+await page.bringToFront();
+
 const pictures = [];
-for (let second_of = 0; second_of < Number(seconds); ++second_of) {
+const begin_s = cpu_s();
+for (let second_of = 0; second_of < seconds; ++second_of) {
   await page.waitForTimeout(1000);
   pictures.push(Number(await page.evaluate(() => document.body.dataset.pictures)));
 }
-expect(errors.length === 0, `errors of the page: ${errors.join("; ")}`);
+const drawing_ms = await page.evaluate(() => document.body.dataset.drawing);
+const cores = (cpu_s() - begin_s) / seconds;
 const panels = await page.locator(".uplot").count();
-const seen = await page.evaluate(
-  () => [...document.querySelectorAll(".uplot")].filter((each) => {
-    const { top, bottom } = each.getBoundingClientRect();
-    return bottom > 0 && top < innerHeight;
-  }).length,
+const visible = await page.evaluate(
+  () =>
+    [...document.querySelectorAll(".uplot")].filter((each) => {
+      const { top, bottom } = each.getBoundingClientRect();
+      return bottom > 0 && top < innerHeight;
+    }).length,
 );
-console.log(JSON.stringify({ joints, panels, seen, pictures, problems }));
 await browser.close();
+page_program.kill("SIGINT");
+await new Promise((done) => page_program.on("exit", done));
+joints_program.kill("SIGINT");
+const { joints: counts, dropped } = JSON.parse(readFileSync(join(folder, "page.json"), "utf8"));
+const lost = counts.reduce((sum, joint) => sum + joint.lost, 0);
+const recordings = printed.split("\n").filter((text) => text.includes("samples of"));
+expect(recordings.length === joint_count, `${recordings.length} recordings were completed`);
+// Errors of a WebSocket that is refused are those of the test.
+const unexpected = errors.filter((text) => !text.includes("WebSocket"));
+expect(unexpected.length === 0, `errors of the page: ${unexpected.join("; ")}`);
+pictures.sort((a, b) => a - b);
+console.log(`${joint_count} joints, ${panels} panels, ${visible} of them on the screen`);
+console.log(`time of the script for a picture: ${drawing_ms} ms`);
+console.log(`pictures in a second: ${pictures[0]} at least, ${pictures[Math.floor(pictures.length / 2)]} median`);
+console.log(`CPU of torsio connect page: ${cores.toFixed(2)} cores; telemetry lost on the line: ${lost}; pages dropped: ${dropped}`);
+console.log(recordings[0]);
+for (const problem of problems) console.log(`FAILED: ${problem}`);
+rmSync(folder, { recursive: true });
 process.exit(problems.length > 0 ? 1 : 0);

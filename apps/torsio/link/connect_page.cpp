@@ -308,8 +308,8 @@ void add_connect_page(CLI::App& connect) {
       "Example: torsio connect page --joints 1-6 --model joint.safetensors\n"
       "It prints the address of the page, which contains a token: whoever has it can look at the "
       "joints, "
-      "records "
-      "them, and turns models on and off. The page does not move a joint.");
+      "record "
+      "them, and turn models on and off. The page does not move a joint.");
   verb->add_option("--joints", flags->joints, "ids of the joints: 1,3,5-8")->capture_default_str();
   verb->add_option("--channels", flags->channels,
                    "channels of torsio connect describe (default: all)")
