@@ -70,6 +70,8 @@ export interface TimeFigure {
   panels: { label: string; series: TimeSeries[] }[];
   /** Low panels, for an overview of many. */
   compact?: boolean;
+  /** It moves: thin lines with few points, which are drawn in a short time. */
+  live?: boolean;
 }
 
 export type Figure = XyFigure | TimeFigure;

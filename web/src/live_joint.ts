@@ -196,6 +196,7 @@ export class LiveJointView {
       bucket: 1,
       windows: [],
       marks: [],
+      live: true,
       panels: panels.filter(({ series }) => series.length > 0),
     };
   }

@@ -2,7 +2,7 @@
 import type { SampleSource, Samples } from "./sample_source";
 
 /** Samples in the buckets whose extremes are kept. */
-const kBuckets = [16, 128];
+const kBuckets = [8, 32, 128];
 
 interface Channel {
   values: Float32Array;
@@ -85,8 +85,10 @@ export class LiveSamples {
     const first = Math.max(Math.ceil(begin_s * this.rate_Hz), this.end - this.capacity, 0);
     const end = Math.min(Math.floor(end_s * this.rate_Hz) + 1, this.end);
     const count = Math.max(end - first, 0);
-    const level = count <= 2 * max_points ? -1 : count / kBuckets[0] <= max_points ? 0 : kBuckets.length - 1;
-    if (level >= 0) return this.extremes(names, first, end, level);
+    if (count > 2 * max_points) {
+      const level = kBuckets.findIndex((size) => count / size <= max_points);
+      return this.extremes(names, first, end, level >= 0 ? level : kBuckets.length - 1);
+    }
     return {
       time_s: Float64Array.from({ length: count }, (_, i) => (first + i) / this.rate_Hz),
       values: names.map((name) => {

@@ -11,6 +11,7 @@ const kCompactHeight = 110;
 /** A measured curve can be seen below the model that follows it. */
 const kWidths: Record<string, number> = { measured: 3, lower: 0.5, upper: 0.5 };
 const kMaxPoints = 2000;
+const kLiveWidth = 1;
 
 interface Panel {
   plot: uPlot;
@@ -120,7 +121,7 @@ export class TimeView implements View {
       const is_drawn = panel.drawn?.[0] === begin && panel.drawn[1] === end;
       if (is_drawn || !panel.is_near || panel.plot.root.hidden) continue;
       panel.drawn = [begin, end];
-      const samples = panel.source.range(begin, end, kMaxPoints);
+      const samples = panel.source.range(begin, end, this.figure.live ? this.width() / 4 : kMaxPoints);
       shown = samples;
       panel.plot.batch(() => {
         panel.plot.setData([samples.time_s, ...samples.values.map(with_gaps)] as unknown as uPlot.AlignedData, false);
@@ -216,7 +217,7 @@ export class TimeView implements View {
             show: one.shown,
             stroke: () => css_colour(series_colour(one.role, colours.get(colour_key(one)) ?? 0)),
             dash: one.role === "limit" ? [4, 4] : series_dash(colours.get(colour_key(one)) ?? 0),
-            width: kWidths[one.role] ?? 1.25,
+            width: this.figure.live ? kLiveWidth : (kWidths[one.role] ?? 1.25),
             points: { show: false },
           })),
         ],

@@ -123,6 +123,8 @@ await other.goto(url.replace(/token=.*/, "token=wrong"));
 await other.waitForFunction(() => document.getElementById("connection").textContent.startsWith("Not connected"));
 await other.close();
 await page.bringToFront();
+await page.locator("figcaption", { hasText: "All channels" }).first().evaluate((caption) => caption.scrollIntoView());
+await page.waitForTimeout(1500);
 
 const pictures = [];
 const begin_s = cpu_s();
