@@ -26,6 +26,7 @@ constexpr std::string_view kPath = "/live";
 constexpr double kLongestBlock_s = 1.0;
 /// A page that asks more often than a person does.
 constexpr std::size_t kMaxRequests = 64;
+constexpr std::size_t kMaxMessage_B = 4096;
 constexpr int kForbidden = 403;
 /// A hysteresis loop.
 constexpr std::string_view kIcon =
@@ -82,8 +83,10 @@ std::string text_of(const LivePage::Status& status) {
   Json recording = nullptr;
   if (!status.recorded_files.empty())
     recording = {{"files", status.recorded_files}, {"duration_s", status.recorded_s}};
-  const Json document{
-      {"op", "status"}, {"recording", std::move(recording)}, {"joints", std::move(joints)}};
+  const Json document{{"op", "status"},
+                      {"trouble", status.trouble},
+                      {"recording", std::move(recording)},
+                      {"joints", std::move(joints)}};
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -101,6 +104,7 @@ class LivePage::Parts {
     const auto longest = static_cast<std::size_t>(kLongestBlock_s * settings_.rate_Hz) + 1;
     for (const Joint& joint : settings_.joints) blocks_.emplace_back(joint.values(), longest);
     WebServer::Settings server = settings_.server;
+    server.message_limit_B = kMaxMessage_B;
     server.files = {page_file("/", "text/html; charset=utf-8", live_html()),
                     page_file("/live.js", "text/javascript; charset=utf-8", live_script()),
                     page_file("/live.css", "text/css; charset=utf-8", live_style()),
@@ -164,9 +168,7 @@ class LivePage::Parts {
     const bool has_token =
         request.query.starts_with(kName) &&
         is_same(std::string_view(request.query).substr(kName.size()), settings_.token);
-    if (has_token) return 0;
-    ++refused_;
-    return kForbidden;
+    return has_token ? 0 : kForbidden;
   }
   void open(const std::shared_ptr<WebClient>& client) {
     const std::lock_guard lock(mutex_);
@@ -188,10 +190,9 @@ class LivePage::Parts {
     if (page_ == client) page_.reset();
   }
   void take(const std::shared_ptr<WebClient>& client, std::string_view text) {
+    const std::optional<Request> request = request_of(Json::parse(text, nullptr, false));
     const std::lock_guard lock(mutex_);
     if (page_ != client) return;
-    const Json message = Json::parse(text, nullptr, false);
-    const std::optional<Request> request = request_of(message);
     if (!request || requests_.size() >= kMaxRequests) {
       ++refused_;
       return;

@@ -88,12 +88,13 @@ class LivePage {
     this.has_new_samples = true;
   }
 
-  private show_status({ recording, joints }: Status): void {
+  private show_status({ recording, trouble, joints }: Status): void {
     this.is_recording = recording !== null;
     const button = by_id<HTMLButtonElement>("record");
     button.setAttribute("aria-pressed", String(this.is_recording));
     button.textContent = this.is_recording ? "End the recording" : "Record";
-    if (recording)
+    if (trouble) by_id("recording").textContent = trouble;
+    else if (recording)
       by_id("recording").textContent = `${recording.duration_s.toFixed(1)} s in ${recording.files.join(", ")}`;
     joints.forEach((status, i) => this.joints[i]?.show_status(status));
   }

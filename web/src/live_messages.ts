@@ -24,6 +24,8 @@ export interface Welcome {
 export interface Status {
   op: "status";
   recording: { files: string[]; duration_s: number } | null;
+  /** Why the last recording was not begun, or has ended. */
+  trouble: string;
   /** By joint: what is not a number. */
   joints: { state: string; monitor: string; silent: boolean; lost: number; models: boolean[] }[];
 }
@@ -38,7 +40,7 @@ export type ToServer = { op: "record"; on: boolean } | { op: "model"; joint: num
 
 export interface Block {
   joint: number;
-  /** Number of the first sample since the beginning of the connection of this page. */
+  /** Number of the first sample since the program was started. */
   first: number;
   count: number;
   /** One channel after the other. */

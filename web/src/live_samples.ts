@@ -11,7 +11,7 @@ interface Channel {
   highest: Float32Array[];
 }
 
-/** Some channels of one joint, in a ring of fixed length. Samples are numbered from the beginning of the connection. */
+/** Some channels of one joint, in a ring of fixed length. Samples are numbered from the start of the program. */
 export class LiveSamples {
   private readonly channels = new Map<string, Channel>();
   private readonly capacity: number;

@@ -2,9 +2,11 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <deque>
+#include <ctime>
+#include <exception>
 #include <filesystem>
 #include <future>
 #include <limits>
@@ -36,7 +38,7 @@ constexpr std::int64_t kStatusPeriod_ns = 200'000'000;
 /// The register that has it, where a joint is monitored.
 constexpr std::string_view kMonitor = "monitor";
 /// A clock that goes back is that of a joint which was started again.
-constexpr std::uint64_t kClockBack_ns = 1'000'000'000;
+constexpr std::uint64_t kRestart_ns = 1'000'000'000;
 
 struct PageFlags : ConnectFlags {
   std::string joints = "1";
@@ -62,10 +64,19 @@ struct PageJoint {
   std::optional<std::uint64_t> first_ns = {};
   std::uint64_t last_ns = 0;
   std::uint64_t first_number = 0;
-  bool has_monitor = true;
+  std::uint64_t next_number = 0;
   std::string state = {};
   std::string monitor = {};  ///< empty: it has none, or no such register
 };
+
+/// "20261128T173747.120Z": the time of now, UTC.
+std::string time_text() {
+  const auto now_ms = std::chrono::duration_cast<std::chrono::milliseconds>(
+                          std::chrono::system_clock::now().time_since_epoch())
+                          .count();
+  return fmt::format("{:%Y%m%dT%H%M%S}.{:03}Z", fmt::gmtime(std::time_t{now_ms / 1000}),
+                     now_ms % 1000);
+}
 
 /// Recordings that a button begins and ends: one file for each joint.
 class PageRecordings {
@@ -78,49 +89,52 @@ class PageRecordings {
 
   [[nodiscard]] bool is_on() const noexcept { return !files_.empty(); }
   [[nodiscard]] const std::vector<std::string>& names() const noexcept { return names_; }
+  /// Why the last recording was not begun, or has ended by itself.
+  [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
   [[nodiscard]] double duration_s() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   }
 
   void begin() {
     if (is_on()) return;
-    const auto now =
-        std::chrono::time_point_cast<std::chrono::milliseconds>(std::chrono::system_clock::now());
+    trouble_.clear();
     begin_ = std::chrono::steady_clock::now();
-    for (std::size_t j = 0; j < joints_.size(); ++j) {
-      const std::string name =
-          fmt::format("joint{}_{:%Y%m%dT%H%M%S}Z.{}", joints_.id(j), now, ending_);
-      const std::string path = (std::filesystem::path(folder_) / name).string();
-      try {
+    const std::string time = time_text();
+    try {
+      for (std::size_t j = 0; j < joints_.size(); ++j) {
+        const std::string name = fmt::format("joint{}_{}.{}", joints_.id(j), time, ending_);
+        const std::string path = (std::filesystem::path(folder_) / name).string();
+        if (std::filesystem::exists(path))
+          throw torsio::Error({.place = path, .problem = "the file exists"});
         files_.push_back(std::make_unique<TelemetryFile>(joints_.subscription(j), path, bridge_s_));
         names_.push_back(path);
-      } catch (const torsio::Error& error) {
-        remark(error.what());
-        end();
-        return;
       }
+    } catch (const std::exception& error) {
+      end();
+      trouble_ = error.what();
+      remark(trouble_);
     }
   }
   void add(std::size_t joint, const torsio::LinkTelemetry& telemetry) {
-    if (is_on()) files_[joint]->add(telemetry);
+    if (!is_on()) return;
+    files_[joint]->add(telemetry);
+    if (!files_[joint]->has_dropped()) return;
+    trouble_ = names_[joint] + ": the disk does not take the samples any more";
+    remark(trouble_);
+    end();
   }
-  /// The files are completed in threads of their own, so that no telemetry waits for the disk.
+  /// The files are completed in a thread of their own, one after the other, so that no telemetry waits for the disk.
   void end() {
-    for (std::size_t j = 0; j < files_.size(); ++j)
-      completed_.push_back(
-          std::async(std::launch::async, [file = std::move(files_[j]), name = names_[j]] {
-            try {
-              return text_of(name, file->close());
-            } catch (const torsio::Error& error) {
-              return std::string(error.what());
-            }
-          }));
-    files_.clear();
-    names_.clear();
+    if (!is_on()) return;
+    auto files = std::make_shared<Files>(std::exchange(files_, {}));
+    completing_.push_back(std::async(std::launch::async,
+                                     [files = std::move(files), names = std::exchange(names_, {})] {
+                                       return completed(*files, names);
+                                     }));
   }
   /// Prints what was completed. @param waits for all
   void report(bool waits) {
-    std::erase_if(completed_, [waits](std::future<std::string>& each) {
+    std::erase_if(completing_, [waits](std::future<std::string>& each) {
       if (!waits && each.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
         return false;
       remark(each.get());
@@ -129,14 +143,31 @@ class PageRecordings {
   }
 
  private:
+  using Files = std::vector<std::unique_ptr<TelemetryFile>>;
+
+  static std::string completed(Files& files, const std::vector<std::string>& names) {
+    std::string text;
+    for (std::size_t j = 0; j < files.size(); ++j) {
+      if (!text.empty()) text += '\n';
+      try {
+        text += text_of(names[j], files[j]->close());
+      } catch (const std::exception& error) {
+        text += error.what();
+      }
+      files[j].reset();
+    }
+    return text;
+  }
+
   std::string folder_;
   std::string ending_;
   double bridge_s_;
   const torsio::JointGroup& joints_;
-  std::vector<std::unique_ptr<TelemetryFile>> files_ = {};
+  Files files_ = {};
   std::vector<std::string> names_ = {};
+  std::string trouble_ = {};
   std::chrono::steady_clock::time_point begin_ = {};
-  std::vector<std::future<std::string>> completed_ = {};
+  std::vector<std::future<std::string>> completing_ = {};
 };
 
 class PageLoop {
@@ -215,10 +246,11 @@ class PageLoop {
   void take(std::size_t index, const torsio::LinkTelemetry& telemetry) {
     recordings_.add(index, telemetry);
     PageJoint& joint = joints_[index];
-    const bool has_restarted = telemetry.time_ns + kClockBack_ns < joint.last_ns;
+    const bool has_restarted = telemetry.time_ns + kRestart_ns < joint.last_ns;
     if (!joint.first_ns || has_restarted) {
       joint.first_ns = telemetry.time_ns;
-      joint.first_number = static_cast<std::uint64_t>(elapsed_s() * rate_Hz_);
+      joint.first_number =
+          std::max(static_cast<std::uint64_t>(elapsed_s() * rate_Hz_), joint.next_number);
     }
     if (telemetry.time_ns < *joint.first_ns) return;
     joint.last_ns = telemetry.time_ns;
@@ -230,6 +262,7 @@ class PageLoop {
     std::ranges::copy(values, joint.values.begin());
     const std::span all(joint.values);
     joint.models.step(number, all.first(values.size()), all.subspan(values.size()));
+    joint.next_number = number + 1;
     page_->add(index, number, joint.values);
   }
 
@@ -244,17 +277,17 @@ class PageLoop {
     }
   }
 
-  /// The joints are asked one after the other, so that a slow reply delays no picture for long.
+  /// One joint each time, since the loop waits for its reply: up to the time-out times five where it is lost.
   void read_state(std::size_t j) {
     if (group_.is_silent(j)) return;
     PageJoint& joint = joints_[j];
+    joint.state = "unknown";
+    joint.monitor.clear();
     try {
       joint.state = std::string(name(group_.state(j)));
-      if (!joint.has_monitor) return;
       joint.monitor = torsio::text_of(group_.read(j, kMonitor));
     } catch (const torsio::Error&) {
-      joint.has_monitor =
-          false;  // a joint without this register, or one that has just become silent
+      return;  // without this register, or without a reply: it is asked again
     }
   }
 
@@ -293,6 +326,19 @@ void run(const PageFlags& flags) {
                                         .timeout_s = line.timeout_s});
   group.subscribe(flags.channels,
                   above_zero(torsio::si_quantity(flags.rate, "Hz", "--rate"), "--rate"));
+  for (std::size_t j = 0; j < group.size(); ++j) {
+    const auto& subscription = group.subscription(j);
+    if (TelemetryFile::recorded(subscription.channels) != subscription.channels)
+      throw torsio::Error({.place = group.place(j),
+                           .problem = "a channel has no SI unit and cannot be recorded",
+                           .advice = "Name the others by --channels."});
+    if (subscription.rate_Hz != group.subscription(0).rate_Hz)
+      throw torsio::Error({.place = group.place(j),
+                           .expected = fmt::format("{:g} Hz, the rate of the first joint",
+                                                   group.subscription(0).rate_Hz),
+                           .found = fmt::format("{:g} Hz", subscription.rate_Hz),
+                           .advice = "Give a rate by --rate that every joint has."});
+  }
   PageLoop loop(flags, group);
   loop.run();
   flags.json.write(torsio::json_text(loop.json()));

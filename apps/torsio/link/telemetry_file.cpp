@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "common/output.hpp"
@@ -16,6 +17,7 @@
 namespace {
 
 constexpr std::string_view kRecorderEnding = ".tsr";
+constexpr std::uint64_t kClockBack_ns = 1'000'000'000;
 
 }  // namespace
 
@@ -62,14 +64,27 @@ TelemetryFile::TelemetryFile(torsio::JointConnection::Subscription subscription,
 
 void TelemetryFile::add(const torsio::LinkTelemetry& telemetry) {
   if (!first_ns_) first_ns_ = telemetry.time_ns;
+  // The clock of a joint that was started again: the recording continues with the next sample.
+  if (telemetry.time_ns + kClockBack_ns < last_ns_) {
+    first_ns_ = telemetry.time_ns;
+    first_tick_ = last_tick_ + 1;
+  }
+  last_ns_ = telemetry.time_ns;
   if (telemetry.time_ns < *first_ns_) return;
-  const auto tick = static_cast<std::int64_t>(std::llround(
-      1e-9 * static_cast<double>(telemetry.time_ns - *first_ns_) * subscription_.rate_Hz));
+  const auto tick =
+      first_tick_ +
+      static_cast<std::int64_t>(std::llround(
+          1e-9 * static_cast<double>(telemetry.time_ns - *first_ns_) * subscription_.rate_Hz));
   if (tick <= last_tick_) return;  // it has arrived late or twice
   last_tick_ = tick;
   const auto& values = telemetry.values;
   values_.assign(values.values.begin(), values.values.begin() + values.count);
   static_cast<void>(recorder_->push(tick, values_));
+}
+
+void TelemetryFile::remove_recorded() const {
+  std::error_code ignored;
+  std::filesystem::remove(recorded_, ignored);
 }
 
 TelemetrySummary TelemetryFile::close() {
@@ -85,7 +100,7 @@ TelemetrySummary TelemetryFile::close() {
          .found = report.trouble,
          .advice = fmt::format("The file has the {} frames before.", report.frames)});
   if (report.frames == 0) {
-    std::filesystem::remove(recorded_);
+    remove_recorded();
     throw torsio::Error({.place = path_,
                          .problem = "no telemetry has arrived",
                          .advice = "The file was not written."});
@@ -102,6 +117,6 @@ TelemetrySummary TelemetryFile::close() {
                                recorded_, path_);
     throw torsio::Error(again);
   }
-  std::filesystem::remove(recorded_);
+  remove_recorded();
   return summary;
 }

@@ -40,12 +40,16 @@ class TelemetryFile {
   TelemetrySummary close();
 
  private:
+  void remove_recorded() const;
+
   std::string path_;
   double bridge_s_;
   std::string recorded_;  ///< the recorder's file
   torsio::JointConnection::Subscription subscription_;
   std::unique_ptr<torsio::Recorder> recorder_;
   std::optional<std::uint64_t> first_ns_ = {};
+  std::int64_t first_tick_ = 0;  ///< tick at `first_ns_`
   std::int64_t last_tick_ = -1;
+  std::uint64_t last_ns_ = 0;
   std::vector<double> values_ = {};
 };

@@ -66,6 +66,8 @@ class LivePage {
     std::vector<bool> models = {};  ///< whether they are on
   };
   struct Status {
+    std::string trouble =
+        {};  ///< why the last recording was not begun, or has ended; empty: no reason
     std::vector<std::string> recorded_files = {};  ///< empty: nothing is recorded
     double recorded_s = 0.0;
     std::vector<JointStatus> joints = {};
@@ -73,7 +75,7 @@ class LivePage {
   struct Counts {
     std::uint64_t pages = 0;  ///< that were connected
     std::uint64_t refused =
-        0;  ///< a wrong token, another page, a message that is not one of the page
+        0;  ///< another page, or a message that is not one of the page; wrong tokens: `server`
     std::uint64_t messages_B = 0;  ///< messages with samples, given to the server
     WebServer::Counts server = {};
   };
@@ -86,7 +88,7 @@ class LivePage {
 
   /// "http://127.0.0.1:8080/?token=..."
   [[nodiscard]] std::string url() const;
-  /// Adds a sample of a joint. @param number counts at `rate_Hz`, from the same beginning for all joints; what is left out is shown
+  /// Adds a sample of a joint. @param number counts at `rate_Hz`, from about the same beginning for all joints; what is left out is shown
   /// as a gap, and an older one than the last is ignored. @param values as `Joint::values` counts them
   void add(std::size_t joint, std::uint64_t number, std::span<const double> values);
   /// Sends what was added since the last time, if a page is connected.
