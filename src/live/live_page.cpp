@@ -163,7 +163,7 @@ class LivePage::Parts {
 
   // In the server's thread.
 
-  int accept(const WebRequest& request) {
+  [[nodiscard]] int accept(const WebRequest& request) const {
     constexpr std::string_view kName = "token=";
     const bool has_token =
         request.query.starts_with(kName) &&

@@ -23,7 +23,7 @@ std::vector<bool> lost_in(const torsio::Recording& recording) {
 void fill(std::span<double> values, std::size_t begin, std::size_t end, bool holds) {
   const double before = values[begin - 1];
   const double after = values[end];
-  const double steps = static_cast<double>(end - begin + 1);
+  const auto steps = static_cast<double>(end - begin + 1);
   for (std::size_t k = begin; k < end; ++k) {
     const double share = static_cast<double>(k - begin + 1) / steps;
     values[k] = std::isnan(after) ? after : before + (holds ? 0.0 : share * (after - before));
