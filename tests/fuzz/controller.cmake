@@ -1,1 +1,0 @@
-torsio_fuzzer(controller torsio::data)
