@@ -27,7 +27,7 @@ if(TORSIO_BUILD_LAB)
   install(TARGETS torsio_data torsio_learn torsio_bench torsio_trials EXPORT torsioLearnTargets FILE_SET HEADERS
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT torsioLearnTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
-  install(TARGETS torsio_report torsio_design torsio_coupling torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS
+  install(TARGETS torsio_report torsio_design torsio_coupling torsio_export torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT torsioLabTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
   install(FILES cmake/Findlz4.cmake cmake/Findcairo.cmake DESTINATION ${torsio_package_dir})

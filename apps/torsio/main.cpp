@@ -85,6 +85,7 @@ int run(int argc, char** argv) {
   add_attribute(app);
   add_adapt(app);
   add_import(app);
+  add_export(app);
   add_monitor(app);
   add_transfer(app);
   add_track(app);

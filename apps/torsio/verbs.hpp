@@ -20,6 +20,7 @@ void add_demo(CLI::App& app);
 void add_adapt(CLI::App& app);
 void add_attribute(CLI::App& app);
 void add_import(CLI::App& app);
+void add_export(CLI::App& app);
 void add_monitor(CLI::App& app);
 void add_track(CLI::App& app);
 void add_transfer(CLI::App& app);

@@ -7,6 +7,7 @@
 #include <complex>
 #include <numbers>
 
+#include "control/controller_listing.hpp"
 #include "control/controller_systems.hpp"
 #include "control/design/loop_design.hpp"
 #include "core/checks.hpp"
@@ -121,6 +122,12 @@ double DeflectionController::fade(double applied) noexcept {
   const double faded = applied * fault_keep_;
   pid_.start(std::abs(faded) > 1e-9 ? faded : 0.0);
   return pid_.command();
+}
+
+void DeflectionController::list(ControllerListing& listing) const noexcept {
+  listing.deflection = {
+      .gains = gains(), .feed_forward_A_rad = feed_forward_A_rad_, .fault_keep = fault_keep_};
+  listing.pid_transfer_keep = pid_.transfer_keep();
 }
 
 JointFeedback DeflectionController::feedback(const Pid::Gains& gains) const {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/controller_listing.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
@@ -143,6 +144,20 @@ void JointCascade::check_limits() const {
     contradict("the current may not move as fast as the limits need it",
                fmt::format("a current rate of at least {:.4g} A/s, or less bandwidth", needed_A_s),
                fmt::format("{:.4g} A/s", limits.current_rate_A_s));
+}
+
+void JointCascade::list(ControllerListing& listing) const noexcept {
+  thermal_.list(listing);
+  ControllerListing::Cascade& own = listing.cascade;
+  own.speed_gain_A_s_rad = speed_gain_A_s_rad_;
+  own.approach_1_s = approach_1_s_;
+  own.braking_rad_s2 = braking_rad_s2_;
+  own.margin_rad = margin_rad_;
+  own.soft_speed_rad_s = soft_speed_rad_s_;
+  own.position_1_s = position_1_s_;
+  own.velocity = velocity_.gains();
+  own.fault_keep = fault_keep_;
+  own.transfer_keep = transfer_.keep();
 }
 
 void JointCascade::reset() noexcept {

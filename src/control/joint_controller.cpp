@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/controller_listing.hpp"
+
 namespace torsio {
 namespace {
 
@@ -58,6 +60,14 @@ JointControllerCore::JointControllerCore(const Settings& settings, double sample
       impedance_({.torque_Nm = torque_settings(settings, sample_rate_Hz).largest_torque_Nm},
                  sample_rate_Hz),
       speed_(sample_rate_Hz, settings.speed_cutoff_Hz) {}
+
+ControllerListing JointControllerCore::listing() const noexcept {
+  ControllerListing listing;
+  torque_.list(listing);
+  cascade_.list(listing);
+  impedance_.list(listing);
+  return listing;
+}
 
 void JointControllerCore::reset() noexcept {
   torque_.reset();

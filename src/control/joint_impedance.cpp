@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/controller_listing.hpp"
 #include "control/controller_systems.hpp"
 #include "control/design/loop_design.hpp"
 #include "control/design/passive_sweep.hpp"
@@ -92,6 +93,11 @@ JointImpedance::Output JointImpedance::step(const Reference& wanted,
   output.torque_Nm = torque_Nm_;
   output.is_limited = torque_Nm_ != all_Nm;
   return output;
+}
+
+void JointImpedance::list(ControllerListing& listing) const noexcept {
+  listing.impedance_transfer_keep = transfer_.keep();
+  listing.impedance_fault_keep = fault_keep_;
 }
 
 JointFeedback impedance_feedback(const DeflectionController& controller,

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "control/controller_listing.hpp"
 #include "core/checks.hpp"
 #include "torsio/control/joint_cascade.hpp"
 
@@ -18,6 +19,12 @@ ThermalLimit::ThermalLimit(double rated_A, double peak_A, double time_constant_s
   require_parameter(time_constant_s > shortest_s && std::isfinite(time_constant_s), kPlace,
                     fmt::format("time_constant_s > {}", shortest_s), time_constant_s);
   share_ = -std::expm1(-1.0 / (time_constant_s * sample_rate_Hz));
+}
+
+void ThermalLimit::list(ControllerListing& listing) const noexcept {
+  listing.cascade.thermal_cold = kCold;
+  listing.cascade.thermal_fade = fade_;
+  listing.cascade.thermal_share = share_;
 }
 
 }  // namespace torsio

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "control/controller_listing.hpp"
 #include "control/design/loop_design.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
@@ -52,6 +53,12 @@ JointFeedback TorqueLoopCore::feedback() const {
 
 Margins TorqueLoopCore::margins_of(JointOutput output) const {
   return margins(open_loop(settings_.deflection.joint, feedback(), output));
+}
+
+void TorqueLoopCore::list(ControllerListing& listing) const noexcept {
+  deflection_.list(listing);
+  listing.largest_torque_Nm = settings_.largest_torque_Nm;
+  listing.torque_transfer_keep = transfer_.keep();
 }
 
 void TorqueLoopCore::check_stability() const {

@@ -14,6 +14,7 @@
 
 #include "core/all_finite.hpp"
 #include "core/checks.hpp"
+#include "estimate/guard_listing.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/core/units.hpp"
@@ -416,6 +417,24 @@ double EstimatorCore::residual_std_at(double value) const noexcept {
   const auto inner_end = table.edges.end() - 1;
   const auto region = std::upper_bound(inner_begin, inner_end, value) - inner_begin;
   return evidence(table.std_dev[static_cast<std::size_t>(region)]);
+}
+
+GuardListing EstimatorCore::listing() const {
+  GuardListing listing{.widths = widths_,
+                       .first_width = first_width_,
+                       .assumes_jumps = assumes_jumps_,
+                       .longest_gap = longest_gap_,
+                       .has_memory = has_memory_,
+                       .resets_model = resets_model_,
+                       .depends_on_rate = depends_on_rate_,
+                       .largest_output = largest_output_,
+                       .jump_limits = jump_limits_,
+                       .raw_slopes = raw_slopes_};
+  for (const Range& range : ranges_)
+    listing.ranges.push_back(
+        {range.lowest, range.highest, range.border, range.per_width, range.reach, range.held});
+  memory_error_.list(listing);
+  return listing;
 }
 
 }  // namespace torsio::detail

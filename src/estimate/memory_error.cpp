@@ -3,6 +3,7 @@
 #include <limits>
 #include <utility>
 
+#include "estimate/guard_listing.hpp"
 #include "torsio/estimate/estimator_core.hpp"
 
 namespace torsio::detail {
@@ -147,6 +148,13 @@ void MemoryError::update_bound() noexcept {
       bound_ += slip.gain * others_[i].left();
     }
   }
+}
+
+void MemoryError::list(GuardListing& listing) const {
+  listing.memory = memory_;
+  listing.decay = decay_;
+  listing.warm_up_ticks = warm_up_ticks_;
+  listing.negligible = negligible_;
 }
 
 }  // namespace torsio::detail

@@ -13,6 +13,7 @@
 #include "core/did_you_mean.hpp"
 #include "signal/expression_graph.hpp"
 #include "signal/expression_parser.hpp"
+#include "signal/pipeline_listing.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/differentiator.hpp"
 #include "torsio/signal/lowpass.hpp"
@@ -41,6 +42,8 @@ class DelayLine {
     }
     return output;
   }
+
+  [[nodiscard]] std::size_t samples() const noexcept { return past_.size(); }
 
   void visit_state(detail::StateBytes& bytes) noexcept {
     bytes.visit(past_, is_full_);
@@ -87,6 +90,8 @@ class StopOperator {
     const double own = std::max(highest_ - state_, state_ - lowest_);
     return std::min(2.0 * threshold_, own + 2.0 * input_error);
   }
+
+  [[nodiscard]] double threshold() const noexcept { return threshold_; }
 
   void visit_state(detail::StateBytes& bytes) noexcept {
     bytes.visit(state_, lowest_, highest_, last_, has_last_);
@@ -142,6 +147,8 @@ class DahlOperator {
     return std::min(2.0, start * std::exp(-sure / distance_) + 4.0 * input_error / distance_);
   }
 
+  [[nodiscard]] double distance() const noexcept { return distance_; }
+
   void visit_state(detail::StateBytes& bytes) noexcept {
     bytes.visit(travel_, largest_input_error_, state_, last_, has_last_);
   }
@@ -184,6 +191,7 @@ struct FeaturePipeline::Program {
   void compile(const ExpressionGraph& graph, const std::vector<std::uint32_t>& input_nodes);
   /// @returns by how many samples the operation settles later than its operands.
   std::size_t add(const Node& node, std::uint32_t target);
+  [[nodiscard]] PipelineListing::Instruction listed(const Instruction& instruction) const;
   [[nodiscard]] double run(const Instruction& instruction) noexcept TORSIO_REALTIME;
   void bound_errors() noexcept TORSIO_REALTIME;
   [[nodiscard]] double error_of(const Instruction& instruction) noexcept TORSIO_REALTIME;
@@ -195,6 +203,7 @@ struct FeaturePipeline::Program {
   std::vector<std::uint32_t> raw_targets;
   std::vector<double> values;
   std::vector<Instruction> instructions;
+  std::vector<PipelineListing::Constant> constants;
   std::vector<Differentiator> differentiators;
   std::vector<Lowpass> lowpasses;
   std::vector<DelayLine> delay_lines;
@@ -245,6 +254,7 @@ void FeaturePipeline::Program::compile(const ExpressionGraph& graph,
     const Node& node = nodes[i];
     if (node.operation == Operation::constant) {
       values[i] = node.parameter;
+      constants.push_back({i, node.parameter});
     } else if (node.operation == Operation::channel) {
       raw_inputs.push_back(graph.channels()[node.left]);
       raw_targets.push_back(i);
@@ -316,6 +326,19 @@ double FeaturePipeline::Program::run(const Instruction& instruction) noexcept {
     case Operation::stop: return stops[instruction.state].step(left);
     case Operation::dahl: return dahls[instruction.state].step(left);
     default: return computed(instruction.operation, left, values[instruction.right]);
+  }
+}
+
+PipelineListing::Instruction FeaturePipeline::Program::listed(
+    const Instruction& instruction) const {
+  const auto [operation, target, left, right, state] = instruction;
+  switch (operation) {
+    case Operation::rate: return PipelineListing::Rate{target, left};
+    case Operation::lowpass: return PipelineListing::Filter{target, left, lowpasses[state].gains()};
+    case Operation::lag: return PipelineListing::Lag{target, left, delay_lines[state].samples()};
+    case Operation::stop: return PipelineListing::Stop{target, left, stops[state].threshold()};
+    case Operation::dahl: return PipelineListing::Dahl{target, left, dahls[state].distance()};
+    default: return PipelineListing::Computation{operation, target, left, right};
   }
 }
 
@@ -426,6 +449,20 @@ std::span<const double> FeaturePipeline::step(std::span<const double> raw) noexc
     }
   }
   return program.features;
+}
+
+PipelineListing FeaturePipeline::listing() const {
+  const Program& program = *program_;
+  PipelineListing listing{.sample_rate_Hz = program.sample_rate_Hz,
+                          .value_count = program.values.size(),
+                          .raw_inputs = program.raw_inputs,
+                          .raw_targets = program.raw_targets,
+                          .constants = program.constants,
+                          .features = program.feature_sources,
+                          .settling_samples = program.settling_samples};
+  for (const Instruction& instruction : program.instructions)
+    listing.instructions.push_back(program.listed(instruction));
+  return listing;
 }
 
 bool FeaturePipeline::are_filters_settled() const noexcept {

@@ -243,14 +243,6 @@ void check_all_outputs(const ArmFlags& flags, const torsio::ArmSetup& setup,
   DataFlags().check_outputs(outputs, inputs);
 }
 
-void make_folder(const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error)
-    throw torsio::Error(
-        {.place = folder, .problem = "the folder cannot be made: " + error.message()});
-}
-
 void write_joints(const ArmFlags& flags, const torsio::ArmRun& run,
                   const torsio::Progress& progress) {
   for (std::size_t j = 0; j < run.joints.size(); ++j) {

@@ -94,11 +94,7 @@ nlohmann::ordered_json calibrated_json(const std::vector<torsio::CalibratedJoint
 
 void write_calibrated(const std::string& folder, const std::vector<torsio::CalibratedJoint>& joints,
                       const torsio::Progress& progress) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error)
-    throw torsio::Error(
-        {.place = folder, .problem = "the folder cannot be made: " + error.message()});
+  make_folder(folder);
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].is_determined) continue;
     for (std::size_t m = 0; m < joints[j].recordings.size(); ++m)

@@ -33,6 +33,14 @@ void JsonOutput::write(std::string_view document) const {
   write_text(destination, document);
 }
 
+void make_folder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw torsio::Error(
+        {.place = folder, .problem = "the folder cannot be made: " + error.message()});
+}
+
 void require_writable(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code absent;

@@ -21,6 +21,8 @@ struct JsonOutput {
 /// Refuses an output that cannot be written before any work is done: its folder is missing or not
 /// writable, or it is a folder itself.
 void require_writable(const std::string& path);
+/// With those above it; one that exists is left as it is. @throws Error
+void make_folder(const std::string& folder);
 /// The same for a model file, which is written completely or not at all: no device, no standard
 /// output. An empty path is none.
 void require_model_file(const std::string& path);

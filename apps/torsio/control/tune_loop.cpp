@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -11,6 +12,7 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "report/json_text.hpp"
+#include "torsio/actuator/controller_file.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/joint_impedance.hpp"
@@ -36,6 +38,11 @@ struct TuneFlags {
   double damping = torsio::DeflectionController::Settings{}.damping;
   std::string observer;
   double load_inertia_kg_m2 = 0.0;
+  std::string lowest;
+  std::string highest;
+  double load_Nm = 0.0;
+  std::string controller;
+  bool overwrite = false;
   JsonOutput json;
 };
 
@@ -165,11 +172,47 @@ Json json_of(const TuneFlags& flags, const Tuned& loop) {
             {"stiffness_passive_to_Hz", kContact_rad_s / kTurn}}}};
 }
 
+/// The controller of these gains, within the ratings of the actuator: friction and torque error up to a twentieth of the
+/// rated torque, loads up to three fifths of it.
+torsio::ControllerFile controller_of(const TuneFlags& flags, const Tuned& loop) {
+  constexpr double kUnmeasuredShare = 0.05;
+  constexpr double kMeasuredShare = 0.6;
+  const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator);
+  const torsio::Drive& drive = loop.controller.settings().joint.drive;
+  const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
+  torsio::ControllerFile file{
+      .actuator = flags.actuator,
+      .sample_rate_Hz = kRate_Hz,
+      .settings = {.torque = {.deflection = loop.controller.settings(),
+                              .observer_cutoff_Hz = loop.observer_Hz},
+                   .limits = {.speed_rad_s = torsio::speed_limit_of(sheet),
+                              .max_unmeasured_load_Nm = kUnmeasuredShare * rated_Nm,
+                              .max_measured_load_Nm = kMeasuredShare * rated_Nm}},
+      .stop = torsio::joint_stop_settings(sheet, flags.load_Nm)};
+  torsio::JointCascade::Limits& limits = file.settings.limits;
+  if (!flags.lowest.empty())
+    limits.lowest_rad = torsio::si_quantity(flags.lowest, "rad", "--lowest-angle");
+  if (!flags.highest.empty())
+    limits.highest_rad = torsio::si_quantity(flags.highest, "rad", "--highest-angle");
+  return file;
+}
+
+void write_controller(const TuneFlags& flags, const Tuned& loop) {
+  require_writable(flags.controller);
+  if (!flags.overwrite && std::filesystem::exists(flags.controller))
+    throw torsio::UsageError({.place = flags.controller,
+                              .problem = "the file exists",
+                              .advice = "Take another name, or replace it with --overwrite."});
+  write_text(flags.controller, torsio::controller_yaml(controller_of(flags, loop)));
+  if (flags.json.wants_tables()) print(fmt::format("{} written\n", flags.controller));
+}
+
 void run(const TuneFlags& flags) {
   DataFlags().check_outputs({flags.json.destination});
   const Tuned loop = tuned(flags);
   if (flags.json.wants_tables()) print(text_of(flags, loop));
   flags.json.write(torsio::json_text(json_of(flags, loop)));
+  if (!flags.controller.empty()) write_controller(flags, loop);
 }
 
 }  // namespace
@@ -197,6 +240,17 @@ void add_tune_loop(CLI::App& app) {
   verb->add_option("--load-inertia", flags->load_inertia_kg_m2,
                    "inertia on the joint side, in kg m2, for the free output")
       ->capture_default_str();
+  verb->add_option(
+      "-o,--output", flags->controller,
+      "write the controller with its limits to FILE.yaml, for torsio export --controller");
+  verb->add_option("--lowest-angle", flags->lowest,
+                   "limit of the motion in that file, such as -90deg; default: none");
+  verb->add_option("--highest-angle", flags->highest, "the same upwards");
+  verb->add_option(
+          "--load", flags->load_Nm,
+          "largest torque in Nm that pulls at the joint at rest, for the stop in that file")
+      ->capture_default_str();
+  verb->add_flag("--overwrite", flags->overwrite, "replace the file if it exists");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

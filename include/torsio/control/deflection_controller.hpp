@@ -12,6 +12,8 @@
 
 namespace torsio {
 
+struct ControllerListing;
+
 /// Turns the spring of a series-elastic actuator to a wanted deflection, by the motor's current:
 ///
 ///     i = K_p (δ* − δ) + K_i ∫(δ* − δ) − K_d δ̇ + K δ* / (N k_t)
@@ -96,6 +98,8 @@ class DeflectionController {
   [[nodiscard]] double cutoff_rad_s() const;
 
   [[nodiscard]] static Pid::Gains gains_for(const Settings& settings);
+  /// Fills its own part.
+  void list(ControllerListing& listing) const noexcept;
 
  private:
   void check_stability() const;

@@ -15,6 +15,8 @@
 
 namespace torsio {
 
+struct ControllerListing;
+
 /// The current that a winding withstands: the square of the current, through a first-order lag,
 /// stays below the square of the rated current (I²t).
 ///
@@ -44,6 +46,8 @@ class ThermalLimit {
   }
   /// @returns w / i_rated², 0 cold, 1 as hot as it may be
   [[nodiscard]] double load() const noexcept { return load_; }
+  /// Fills its own part.
+  void list(ControllerListing& listing) const noexcept;
 
  private:
   static constexpr double kCold = 0.75;
@@ -208,6 +212,8 @@ class JointCascade {
   /// @returns m [rad], v_max′ [rad/s]
   [[nodiscard]] double position_margin() const noexcept { return margin_rad_; }
   [[nodiscard]] double soft_speed() const noexcept { return soft_speed_rad_s_; }
+  /// Fills its own part.
+  void list(ControllerListing& listing) const noexcept;
 
  private:
   struct Bounds {

@@ -68,6 +68,8 @@ class JointControllerCore {
 
   [[nodiscard]] const JointCascade& cascade() const noexcept { return cascade_; }
   [[nodiscard]] const TorqueLoopCore& torque() const noexcept { return torque_; }
+  /// For what writes the controller down in another language.
+  [[nodiscard]] ControllerListing listing() const noexcept;
 
  private:
   void enter(JointMode mode) noexcept;

@@ -9,6 +9,8 @@
 
 namespace torsio {
 
+struct ControllerListing;
+
 /// A spring and a damper at the joint, as the reference of a `TorqueController`:
 ///
 ///     τ* = K (q* − q) + D (q̇* − q̇) + τ_ff,   then limited in size and rate
@@ -61,6 +63,8 @@ class JointImpedance {
   /// @returns false, and both stay, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
   [[nodiscard]] const Gains& gains() const noexcept { return gains_; }
+  /// Fills its own part.
+  void list(ControllerListing& listing) const noexcept;
 
  private:
   Output fade() noexcept;

@@ -27,6 +27,8 @@ class BumplessTransfer {
   void add(double bump) noexcept { bump_ += bump; }
   /// @returns the part that the next `step` adds
   [[nodiscard]] double pending() const noexcept { return bump_; }
+  /// @returns the share that remains from one tick to the next
+  [[nodiscard]] double keep() const noexcept { return keep_; }
   /// @returns the part that is added in this tick
   double step() noexcept TORSIO_REALTIME {
     const double now = bump_;
@@ -122,6 +124,8 @@ class Pid {
   /// @returns the last command, or the one applied in its place according to `track`
   [[nodiscard]] double command() const noexcept { return last_.command; }
   [[nodiscard]] static bool is_valid(const Gains& gains) noexcept;
+  /// @returns the share of a bumpless transfer that remains from one tick to the next
+  [[nodiscard]] double transfer_keep() const noexcept { return transfer_.keep(); }
 
  private:
   void set_tracking_share() noexcept;

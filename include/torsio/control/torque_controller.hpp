@@ -120,6 +120,8 @@ class TorqueLoopCore {
   /// The feedback of the loop, the observer included. Allocates.
   [[nodiscard]] JointFeedback feedback() const;
   [[nodiscard]] Margins margins_of(JointOutput output) const;
+  /// Fills its own part.
+  void list(ControllerListing& listing) const noexcept;
 
  private:
   void check_stability() const;

@@ -19,6 +19,10 @@
 #include "torsio/model/common/model.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
+namespace torsio {
+struct GuardListing;
+}
+
 namespace torsio::detail {
 
 /// Bounds the error of a model's output that is caused by inputs that its memory did not receive,
@@ -71,6 +75,9 @@ class MemoryError {
   void follow(std::span<const double> inputs) noexcept TORSIO_REALTIME {
     if (!is_zero_) advance(inputs);
   }
+
+  /// Fills its own part.
+  void list(GuardListing& listing) const;
 
   /// The members that change in a step.
   void visit_state(StateBytes& bytes) noexcept {
@@ -269,6 +276,9 @@ class EstimatorCore {
   [[nodiscard]] double highest(std::size_t feature) const noexcept {
     return ranges_[feature].highest;
   }
+
+  /// For what writes the guards down in another language.
+  [[nodiscard]] GuardListing listing() const;
 
   /// The members that change in a step; not the zeros.
   void visit_state(StateBytes& bytes) noexcept {

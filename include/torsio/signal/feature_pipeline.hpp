@@ -29,6 +29,8 @@ struct FeatureSpec {
   bool operator==(const FeatureSpec&) const = default;
 };
 
+struct PipelineListing;
+
 /// Raw channels of one tick -> features of one tick. Parsed once; `step` allocates nothing.
 ///
 /// An expression is built from channel names, numbers (a unit may follow: `10Hz`, `0.3deg`),
@@ -88,6 +90,9 @@ class FeaturePipeline {
   /// low-pass and a lag are taken as immediate. 0 once it is settled; infinite where there is no bound (the
   /// rate of such a state).
   [[nodiscard]] std::span<const double> state_errors() const noexcept;
+
+  /// What is computed in each step, for what writes it down in another language.
+  [[nodiscard]] PipelineListing listing() const;
 
   /// The members that change in a step; not the zeros.
   void visit_state(detail::StateBytes& bytes) noexcept;

@@ -55,6 +55,14 @@ class Lowpass {
   /// Standard deviation of the output over that of a white input, in the long run.
   [[nodiscard]] double noise_gain() const noexcept;
 
+  /// The factors of a step.
+  struct Gains {
+    double band = 0.0;
+    double low = 0.0;
+    double high = 0.0;
+  };
+  [[nodiscard]] Gains gains() const noexcept { return {band_gain_, low_gain_, high_gain_}; }
+
   /// The members that change in a step.
   void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(band_, low_, is_started_); }
 

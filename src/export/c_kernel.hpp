@@ -1,0 +1,11 @@
+#pragma once
+
+#include "export/c_text.hpp"
+#include "model/gaussian_process/parametric_gp.hpp"
+
+namespace torsio {
+
+/// The functions of `write_model` for a parametric Gaussian process.
+void write_parametric_gp(CText& c, const ParametricGp::Parameters& parameters);
+
+}  // namespace torsio

@@ -1,0 +1,173 @@
+// What an exported program computes, against torsio's own step, for each family that can be exported.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "export/exported_program.hpp"
+#include "model/hysteresis/operator_sum.hpp"
+#include "support/every_family.hpp"
+#include "support/example_model_file.hpp"
+#include "support/example_models.hpp"
+#include "support/grey_box_examples.hpp"
+#include "support/temporary_folder.hpp"
+#include "torsio/core/matrix.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/estimate/estimator.hpp"
+#include "torsio/model/any_model.hpp"
+
+namespace torsio::test {
+
+/// A linear model whose coefficients depend on its second input.
+struct Scheduled : Linear {
+  using Linear::Linear;
+};
+template <>
+inline Scheduled example<Scheduled>() {
+  Linear::Parameters parameters;
+  parameters.coefficients = {
+      .scheduled = true, .feature = 1, .knots = {-1.0, 0.0, 2.0}, .values = Matrix(3, 3)};
+  parameters.coefficients.values.values = {0.5, 80.0, 1.0, 0.1, 100.0, 2.0, -0.5, 90.0, 4.0};
+  return Scheduled(parameters);
+}
+
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// Guards that detect jumps; the ranges lie within the reach of the motion.
+ModelFile guarded(const AnyModel& model) {
+  ModelFile file = example_model_file(model);
+  file.settings.ranges = {.lowest = {-0.1, -3.0}, .highest = {0.1, 3.0}, .margin = 0.05};
+  file.settings.disturbances = {
+      .largest_step = {0.01, 0.01}, .largest_travel = 0.01, .warm_up_s = 0.05};
+  file.settings.output.largest_target = 400.0;
+  return file;
+}
+
+/// The same with every operation that has a memory, and others.
+ModelFile remembering(const AnyModel& model) {
+  ModelFile file = guarded(model);
+  file.settings.features.inputs = {
+      "stop(spring_deflection_rad, 60mrad) + 0.1 * dahl(spring_deflection_rad, 20mrad)",
+      "lowpass(rate(lag(spring_deflection_rad, 3)), 50Hz) + sin(joint_angle_rad) * "
+      "exp(-abs(joint_angle_rad)) + "
+      "min(gear_angle_rad, 0) ^ 2 + sqrt(abs(gear_angle_rad)) + atan(joint_angle_rad) + "
+      "tanh(gear_angle_rad)"};
+  return file;
+}
+
+/// A motion with missing samples, gaps, a spike, other levels and excursions. A jump is far from its limit.
+std::vector<std::vector<double>> motion(std::size_t ticks) {
+  Random random(3);
+  std::vector<std::vector<double>> raw;
+  double level = 0.0;
+  for (std::size_t n = 0; n < ticks; ++n) {
+    const auto t = static_cast<double>(n);
+    const std::size_t q = n % 4000;
+    if (q == 3300) level += 0.05;
+    double gear_rad = 0.06 * std::sin(0.01 * t) + 1e-5 * random.normal() + level;
+    double joint_rad = 0.02 * std::sin(0.0037 * t);
+    if (q >= 2500 && q < 3000)
+      gear_rad +=
+          0.2 * std::sin((t - static_cast<double>(n - q) - 2500.0) / 500.0 * std::numbers::pi);
+    if (q == 1200) gear_rad += 0.5;
+    if (q == 700 || (q >= 900 && q < 905) || (q >= 1600 && q < 1650)) gear_rad = kNan;
+    if (q == 800) joint_rad = std::numeric_limits<double>::infinity();
+    raw.push_back({gear_rad, joint_rad});
+  }
+  return raw;
+}
+
+double counted(double angle_rad, double counts_per_turn) {
+  return std::round(angle_rad / (2.0 * std::numbers::pi) * counts_per_turn);
+}
+
+/// Steps both and compares values, error bars and faults. @param tolerance as a share of the range of the torque
+void expect_equal(const ModelFile& file, const C99Options& options, double tolerance,
+                  std::size_t ticks = 8000) {
+  const TemporaryFolder folder;
+  BasicEstimator<AnyModel> own(file.settings, AnyModel(file.parameters));
+  for (const std::string& channel : file.settings.zeroed_channels) own.set_zero(channel, 0.0);
+  ExportedProgram exported(folder, file, options, own.raw_inputs());
+  double lowest = 0.0;
+  double highest = 0.0;
+  double worst = 0.0;
+  std::size_t in_use = 0;
+  std::size_t other_faults = 0;
+  for (std::vector<double> raw : motion(ticks)) {
+    std::vector<double> given = raw;
+    for (std::size_t i = 0; i < raw.size(); ++i) {
+      const auto counts = std::ranges::find(options.counts, own.raw_inputs()[i], &CCounts::channel);
+      if (counts != options.counts.end()) {
+        if (!std::isfinite(raw[i])) raw[i] = 0.0;
+        given[i] = counted(raw[i], counts->counts_per_turn);
+        raw[i] = given[i] / counts->counts_per_turn * 2.0 * std::numbers::pi;
+      } else if (options.real == CReal::single) {
+        given[i] = raw[i] = static_cast<double>(static_cast<float>(raw[i]));
+      }
+    }
+    const Estimate expected = own.step(raw);
+    const Estimate found = exported.step(given);
+    lowest = std::min(lowest, expected.value);
+    highest = std::max(highest, expected.value);
+    worst = std::max(worst, std::abs(found.value - expected.value));
+    EXPECT_TRUE(std::isfinite(found.value));
+    if (found.fault != expected.fault) ++other_faults;
+    EXPECT_EQ(std::isnan(found.std_dev), std::isnan(expected.std_dev));
+    if (expected.fault == Fault::none) ++in_use;
+  }
+  EXPECT_LT(worst, tolerance * (highest - lowest));
+  EXPECT_EQ(other_faults, 0U);
+  EXPECT_GT(in_use, ticks / 20);
+  EXPECT_LT(exported.self_test(), tolerance);
+}
+
+template <class Family>
+AnyModel any_example() {
+  return AnyModel(AnyModel::Parameters(example<Family>().parameters()));
+}
+
+template <class Family>
+class C99 : public testing::Test {};
+using Exported = testing::Types<Linear, Scheduled, GreyBoxWithBanks, GreyBoxWithMlp, LinearCoulomb,
+                                Polynomial, MaxwellSlipModel, PrandtlIshlinskii, GreyBox, Mlp, Gru,
+                                Lstm, ParametricGp, Viscoelastic, HammersteinWiener>;
+struct ExportedName {
+  template <class M>
+  static std::string GetName(int index) {
+    return std::to_string(index) + "_" + std::string(M::kFamily);
+  }
+};
+TYPED_TEST_SUITE(C99, Exported, ExportedName);
+
+TYPED_TEST(C99, InDoubleIsTheEstimator) {
+  expect_equal(guarded(any_example<TypeParam>()), {.name = "joint", .real = CReal::twofold}, 1e-6);
+}
+
+TYPED_TEST(C99, InFloatIsNearlyTheEstimator) {
+  expect_equal(guarded(any_example<TypeParam>()), {.name = "joint", .real = CReal::single}, 1e-4);
+}
+
+TYPED_TEST(C99, HasTheWholeLanguageOfItsFeatures) {
+  expect_equal(remembering(any_example<TypeParam>()), {.name = "joint", .real = CReal::twofold},
+               1e-6);
+}
+
+TYPED_TEST(C99, TakesCountsOfEncoders) {
+  expect_equal(guarded(any_example<TypeParam>()),
+               {.name = "joint",
+                .real = CReal::single,
+                .counts = {{"gear_angle_rad", 16777216.0}, {"joint_angle_rad", -524288.0}}},
+               1e-4);
+}
+
+}  // namespace
+}  // namespace torsio::test

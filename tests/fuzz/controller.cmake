@@ -1,0 +1,1 @@
+torsio_fuzzer(controller torsio::data)
