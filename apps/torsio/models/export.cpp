@@ -1,251 +1,46 @@
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
-#include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <initializer_list>
-#include <nlohmann/json.hpp>
-#include <optional>
+#include <memory>
 #include <string>
-#include <string_view>
-#include <utility>
 #include <vector>
 
-#include "common/output.hpp"
+#include "models/export_flags.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/units.hpp"
-#include "torsio/export/c99.hpp"
-#include "torsio/export/c_cost.hpp"
-#include "torsio/files/model_file.hpp"
-#include "torsio/report/text_table.hpp"
 #include "verbs.hpp"
+
+void require_new(const ExportFlags& flags, const std::string& file) {
+  require_writable(file);
+  if (!flags.overwrite && std::filesystem::exists(file))
+    throw torsio::UsageError(
+        {.place = file,
+         .problem = "the file exists",
+         .advice = "Take another name or folder, or replace it with --overwrite."});
+}
 
 namespace {
 
-struct ExportFlags {
-  std::string model;
-  std::string c99;
-  std::string real = "float";
-  std::vector<std::string> counts;
-  std::string controller;
-  std::string folder;
-  std::string target;
-  std::string flash;
-  std::string ram;
-  std::string clock;
-  bool overwrite = false;
-  JsonOutput json;
+/// A target and the flag that selects it.
+struct Target {
+  const char* flag;
+  bool is_wanted;
+  void (*write)(ExportFlags&);
 };
 
-torsio::CReal real_of(const std::string& text) {
-  if (text == "float") return torsio::CReal::single;
-  if (text == "double") return torsio::CReal::twofold;
-  throw torsio::UsageError({.place = "--real", .expected = "float or double", .found = text});
-}
-
-/// "gear_angle_rad=524288"
-torsio::CCounts counts_of(const std::string& text) {
-  const auto equals = text.find('=');
-  if (equals == std::string::npos)
-    throw torsio::UsageError({.place = "--counts",
-                              .expected = "CHANNEL=COUNTS_PER_TURN, such as gear_angle_rad=524288",
-                              .found = text});
-  return {.channel = text.substr(0, equals),
-          .counts_per_turn = torsio::si_quantity(text.substr(equals + 1), "1", "--counts")};
-}
-
-/// A number with an ending that scales it: "256kB", "168MHz". @param unit without an ending
-std::optional<double> scaled(const std::string& text, const char* flag, const char* unit,
-                             std::initializer_list<std::pair<std::string_view, double>> endings,
-                             const char* example) {
-  if (text.empty()) return std::nullopt;
-  std::string number = text;
-  double factor = 1.0;
-  for (const auto& [ending, scale] : endings)
-    if (number.ends_with(ending)) {
-      number.resize(number.size() - ending.size());
-      factor = scale;
-      break;
-    }
-  const double value = factor * torsio::si_quantity(number, unit, flag);
-  if (!(value > 0.0) || !std::isfinite(value))
-    throw torsio::UsageError({.place = flag,
-                              .expected = fmt::format("a positive number, such as {}", example),
-                              .found = text});
-  return value;
-}
-
-/// "256kB" in bytes.
-std::optional<double> memory_of(const std::string& text, const char* flag) {
-  constexpr double kKilo = 1024.0;
-  return scaled(text, flag, "1", {{"MB", kKilo * kKilo}, {"kB", kKilo}, {"B", 1.0}}, "256kB");
-}
-
-/// "168MHz" in Hz.
-std::optional<double> clock_of(const std::string& text) {
-  return scaled(text, "--clock", "Hz", {{"GHz", 1e9}, {"MHz", 1e6}, {"kHz", 1e3}}, "168MHz");
-}
-
-std::string size_text(double bytes) {
-  return bytes < 10240.0 ? fmt::format("{:.0f} B", bytes)
-                         : fmt::format("{:.0f} kB", bytes / 1024.0);
-}
-
-void require_room(const char* what, double needed, const std::optional<double>& given,
-                  const std::string& target) {
-  if (!given || needed <= *given) return;
-  throw torsio::Error(
-      {.place = fmt::format("{} of {}", what, target),
-       .expected = fmt::format("at least {} (estimated)", size_text(needed)),
-       .found = fmt::format("{}: {} are missing", size_text(*given), size_text(needed - *given)),
-       .advice = "Take a smaller model (fewer units, knots or points), or another target."});
-}
-
-/// What a step may take of the time between two: the rest is for the drive's other work, and instructions take more
-/// than one cycle each.
-constexpr double kLargestShare = 0.5;
-
-void require_time(const torsio::CCost& cost, double rate_Hz, const std::optional<double>& clock_Hz,
-                  const std::string& target) {
-  if (!clock_Hz) return;
-  const torsio::CCost::Step& step = cost.control ? *cost.control : cost.step;
-  const double share = step.instructions * rate_Hz / *clock_Hz;
-  if (share <= kLargestShare) return;
-  throw torsio::Error(
-      {.place = fmt::format("the rate of {}", target),
-       .expected = fmt::format(
-           "at most {:.0f} instructions a step, half of those between two steps of {:g} Hz",
-           kLargestShare * *clock_Hz / rate_Hz, rate_Hz),
-       .found = fmt::format("{:.0f} (estimated)", step.instructions),
-       .advice = "Take a smaller model, a model at a lower rate, or a faster target."});
-}
-
-std::string cost_table(const std::string& prefix, const torsio::C99Program& program,
-                       torsio::CReal real, double rate_Hz,
-                       const std::vector<const torsio::CTarget*>& targets) {
-  torsio::TextTable table;
-  table.header({"target", "flash", "RAM", "function", "stack", "instructions",
-                fmt::format("at {:g} Hz", rate_Hz)});
-  for (const torsio::CTarget* target : targets) {
-    const torsio::CCost cost = torsio::c_cost(program, *target, real);
-    std::vector<std::string> first{std::string(target->name), size_text(cost.flash),
-                                   size_text(cost.ram)};
-    const auto add = [&](const char* function, const torsio::CCost::Step& step) {
-      first.insert(
-          first.end(),
-          {prefix + function, size_text(step.stack), fmt::format("{:.0f}", step.instructions),
-           fmt::format("{:.2f} million a second", 1e-6 * step.instructions * rate_Hz)});
-      table.row(first);
-      first = {"", "", ""};
-    };
-    add("_step", cost.step);
-    if (cost.control) add("_control_step", *cost.control);
-  }
-  return table.text() +
-         "estimated, within 15 %; flash without the library functions of a target that computes in "
-         "software\n";
-}
-
-template <class Kind, class Counts>
-nlohmann::json counts_json(const Counts& counts) {
-  nlohmann::json all = nlohmann::json::object();
-  for (std::size_t i = 0; i < counts.size(); ++i)
-    all[std::string(name(static_cast<Kind>(i)))] = counts[i];
-  return all;
-}
-
-/// What the costs are estimated from.
-nlohmann::json parts_json(const torsio::C99Program& program) {
-  nlohmann::json parts{
-      {"work", counts_json<torsio::CWork>(program.work)},
-      {"code", counts_json<torsio::CCode>(program.code)},
-      {"stack", counts_json<torsio::CStack>(torsio::c_stack(program.work, program.local_bytes,
-                                                            program.control_work.has_value()))}};
-  if (program.control_work) {
-    parts["control_work"] = counts_json<torsio::CWork>(*program.control_work);
-    parts["control_stack"] = counts_json<torsio::CStack>(
-        torsio::c_stack(*program.control_work, program.local_bytes, true));
-  }
-  return parts;
-}
-
-nlohmann::json cost_json(const torsio::C99Program& program, torsio::CReal real,
-                         const std::vector<const torsio::CTarget*>& targets) {
-  nlohmann::json all = nlohmann::json::array();
-  for (const torsio::CTarget* target : targets) {
-    const torsio::CCost cost = torsio::c_cost(program, *target, real);
-    all.push_back({{"target", std::string(target->name)},
-                   {"flash_bytes", cost.flash},
-                   {"ram_bytes", cost.ram},
-                   {"stack_bytes", cost.step.stack},
-                   {"instructions", cost.step.instructions}});
-    if (cost.control)
-      all.back()["control"] = {{"stack_bytes", cost.control->stack},
-                               {"instructions", cost.control->instructions}};
-  }
-  return all;
-}
-
 void run(ExportFlags& flags) {
-  const std::filesystem::path folder(flags.folder);
-  const std::string header = (folder / (flags.c99 + ".h")).string();
-  const std::string source = (folder / (flags.c99 + ".c")).string();
-  const torsio::CReal real = real_of(flags.real);
-  torsio::C99Options options{.name = flags.c99, .real = real};
-  for (const std::string& each : flags.counts) options.counts.push_back(counts_of(each));
-  if (!flags.controller.empty()) options.controller = torsio::read_controller(flags.controller);
-  std::vector<const torsio::CTarget*> targets;
-  if (!flags.target.empty())
-    targets.push_back(&torsio::find_c_target(flags.target));
-  else
-    for (const torsio::CTarget& target : torsio::c_targets())
-      if ((real == torsio::CReal::single ? target.single : target.twofold) != nullptr)
-        targets.push_back(&target);
-  const auto flash = memory_of(flags.flash, "--flash");
-  const auto ram = memory_of(flags.ram, "--ram");
-  const auto clock_Hz = clock_of(flags.clock);
-  if ((flash || ram || clock_Hz) && flags.target.empty())
-    throw torsio::UsageError({.place = "--target",
-                              .problem = "--flash, --ram and --clock are those of one target",
-                              .advice = "Name it with --target."});
-  const torsio::ModelFile model = torsio::load_model(flags.model);
-  const torsio::C99Program program =
-      torsio::c99_program(model, options, std::filesystem::path(flags.model).filename().string());
-  if (!flags.target.empty()) {
-    const torsio::CCost cost = torsio::c_cost(program, *targets.front(), real);
-    require_room("the flash", cost.flash, flash, flags.target);
-    const double stack = std::max(cost.step.stack, cost.control ? cost.control->stack : 0.0);
-    require_room("the RAM", cost.ram + stack, ram, flags.target);
-    require_time(cost, model.settings.sample_rate_Hz, clock_Hz, flags.target);
+  const Target targets[] = {{"--c99", !flags.c99.empty(), export_c99}};
+  const Target* wanted = nullptr;
+  for (const Target& target : targets) {
+    if (!target.is_wanted) continue;
+    if (wanted != nullptr)
+      throw torsio::UsageError({.place = target.flag,
+                                .problem = "one target at a time",
+                                .advice = std::string("Remove it or ") + wanted->flag + "."});
+    wanted = &target;
   }
-  make_folder(flags.folder);
-  for (const std::string& file : {header, source}) {
-    require_writable(file);
-    if (!flags.overwrite && std::filesystem::exists(file))
-      throw torsio::UsageError(
-          {.place = file,
-           .problem = "the file exists",
-           .advice = "Take another name or folder, or replace it with --overwrite."});
-  }
-  write_text(header, program.header);
-  write_text(source, program.source);
-  if (flags.json.wants_tables())
-    print(
-        fmt::format("{} and {} written: {}, {}, {} Hz\n{}", header, source,
-                    model.parameters.family(), flags.real, model.settings.sample_rate_Hz,
-                    cost_table(flags.c99, program, real, model.settings.sample_rate_Hz, targets)));
-  nlohmann::json document{{"format", "torsio.export"},
-                          {"version", 1},
-                          {"family", std::string(model.parameters.family())},
-                          {"real", flags.real},
-                          {"header", header},
-                          {"source", source},
-                          {"table_bytes", program.table_bytes},
-                          {"state_bytes", program.state_bytes},
-                          {"parts", parts_json(program)},
-                          {"targets", cost_json(program, real, targets)}};
-  flags.json.write(document.dump(2) + "\n");
+  if (wanted == nullptr)
+    throw torsio::UsageError({.place = "torsio export",
+                              .expected = "a target: --c99 NAME",
+                              .advice = "torsio export --help describes them."});
+  wanted->write(flags);
 }
 
 }  // namespace
@@ -256,30 +51,25 @@ void add_export(CLI::App& app) {
       app.add_subcommand("export", "write a model as a C program for a drive's microcontroller");
   verb->footer(
       "Example: torsio export joint.safetensors --c99 joint --real float --counts "
-      "gear_angle_rad=524288 "
-      "--counts joint_angle_rad=524288 -o firmware\n"
+      "gear_angle_rad=524288 --counts joint_angle_rad=524288 -o firmware\n"
       "Writes firmware/joint.h and firmware/joint.c: C99 without a library or a heap, with the "
-      "pipeline, the guards, "
-      "the fallback, the error bar and the faults of the estimator. Compiled with "
-      "-DJOINT_SELF_TEST it compares "
-      "itself with torsio.\n"
+      "pipeline, the guards, the fallback, the error bar and the faults of the estimator. Compiled "
+      "with -DJOINT_SELF_TEST it compares itself with torsio.\n"
       "A float does not resolve the difference of two angles: give angles as counts of their "
       "encoders.");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   verb->add_option("--c99", flags->c99,
-                   "name of the program: of its files and the prefix of its functions")
-      ->required();
-  verb->add_option("--real", flags->real, "type of its numbers: float or double")
-      ->capture_default_str();
+                   "a C program of this name: that of its files and the prefix of its functions");
+  verb->add_option("--real", flags->real,
+                   "type of its numbers: float or double (default float for --c99)");
   verb->add_option("--counts", flags->counts,
                    "CHANNEL=COUNTS: this angle is given as counts of an encoder with so many in a "
-                   "turn; negative if "
-                   "the angle falls where they rise");
+                   "turn; negative if the angle falls where they rise");
   verb->add_option(
       "--controller", flags->controller,
       "FILE.yaml of torsio tune-loop: add the controller of the joint, with the model as "
       "the inverse of its spring");
-  verb->add_option("-o,--output", flags->folder, "folder of the files")->required();
+  verb->add_option("-o,--output", flags->output, "folder of the files of a C program")->required();
   verb->add_option(
       "--target", flags->target,
       "estimate the cost for this target only: cortex-m4f or cortex-m7 (--real double: cortex-m7)");

@@ -1,0 +1,228 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "models/export_flags.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/export/c99.hpp"
+#include "torsio/export/c_cost.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/report/text_table.hpp"
+
+namespace {
+
+torsio::CReal real_of(const std::string& text) {
+  if (text.empty() || text == "float") return torsio::CReal::single;
+  if (text == "double") return torsio::CReal::twofold;
+  throw torsio::UsageError({.place = "--real", .expected = "float or double", .found = text});
+}
+
+/// "gear_angle_rad=524288"
+torsio::CCounts counts_of(const std::string& text) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos)
+    throw torsio::UsageError({.place = "--counts",
+                              .expected = "CHANNEL=COUNTS_PER_TURN, such as gear_angle_rad=524288",
+                              .found = text});
+  return {.channel = text.substr(0, equals),
+          .counts_per_turn = torsio::si_quantity(text.substr(equals + 1), "1", "--counts")};
+}
+
+/// A number with an ending that scales it: "256kB", "168MHz". @param unit without an ending
+std::optional<double> scaled(const std::string& text, const char* flag, const char* unit,
+                             std::initializer_list<std::pair<std::string_view, double>> endings,
+                             const char* example) {
+  if (text.empty()) return std::nullopt;
+  std::string number = text;
+  double factor = 1.0;
+  for (const auto& [ending, scale] : endings)
+    if (number.ends_with(ending)) {
+      number.resize(number.size() - ending.size());
+      factor = scale;
+      break;
+    }
+  const double value = factor * torsio::si_quantity(number, unit, flag);
+  if (!(value > 0.0) || !std::isfinite(value))
+    throw torsio::UsageError({.place = flag,
+                              .expected = fmt::format("a positive number, such as {}", example),
+                              .found = text});
+  return value;
+}
+
+/// "256kB" in bytes.
+std::optional<double> memory_of(const std::string& text, const char* flag) {
+  constexpr double kKilo = 1024.0;
+  return scaled(text, flag, "1", {{"MB", kKilo * kKilo}, {"kB", kKilo}, {"B", 1.0}}, "256kB");
+}
+
+/// "168MHz" in Hz.
+std::optional<double> clock_of(const std::string& text) {
+  return scaled(text, "--clock", "Hz", {{"GHz", 1e9}, {"MHz", 1e6}, {"kHz", 1e3}}, "168MHz");
+}
+
+std::string size_text(double bytes) {
+  return bytes < 10240.0 ? fmt::format("{:.0f} B", bytes)
+                         : fmt::format("{:.0f} kB", bytes / 1024.0);
+}
+
+void require_room(const char* what, double needed, const std::optional<double>& given,
+                  const std::string& target) {
+  if (!given || needed <= *given) return;
+  throw torsio::Error(
+      {.place = fmt::format("{} of {}", what, target),
+       .expected = fmt::format("at least {} (estimated)", size_text(needed)),
+       .found = fmt::format("{}: {} are missing", size_text(*given), size_text(needed - *given)),
+       .advice = "Take a smaller model (fewer units, knots or points), or another target."});
+}
+
+/// What a step may take of the time between two: the rest is for the drive's other work, and instructions take more
+/// than one cycle each.
+constexpr double kLargestShare = 0.5;
+
+void require_time(const torsio::CCost& cost, double rate_Hz, const std::optional<double>& clock_Hz,
+                  const std::string& target) {
+  if (!clock_Hz) return;
+  const torsio::CCost::Step& step = cost.control ? *cost.control : cost.step;
+  const double share = step.instructions * rate_Hz / *clock_Hz;
+  if (share <= kLargestShare) return;
+  throw torsio::Error(
+      {.place = fmt::format("the rate of {}", target),
+       .expected = fmt::format(
+           "at most {:.0f} instructions a step, half of those between two steps of {:g} Hz",
+           kLargestShare * *clock_Hz / rate_Hz, rate_Hz),
+       .found = fmt::format("{:.0f} (estimated)", step.instructions),
+       .advice = "Take a smaller model, a model at a lower rate, or a faster target."});
+}
+
+std::string cost_table(const std::string& prefix, const torsio::C99Program& program,
+                       torsio::CReal real, double rate_Hz,
+                       const std::vector<const torsio::CTarget*>& targets) {
+  torsio::TextTable table;
+  table.header({"target", "flash", "RAM", "function", "stack", "instructions",
+                fmt::format("at {:g} Hz", rate_Hz)});
+  for (const torsio::CTarget* target : targets) {
+    const torsio::CCost cost = torsio::c_cost(program, *target, real);
+    std::vector<std::string> first{std::string(target->name), size_text(cost.flash),
+                                   size_text(cost.ram)};
+    const auto add = [&](const char* function, const torsio::CCost::Step& step) {
+      first.insert(
+          first.end(),
+          {prefix + function, size_text(step.stack), fmt::format("{:.0f}", step.instructions),
+           fmt::format("{:.2f} million a second", 1e-6 * step.instructions * rate_Hz)});
+      table.row(first);
+      first = {"", "", ""};
+    };
+    add("_step", cost.step);
+    if (cost.control) add("_control_step", *cost.control);
+  }
+  return table.text() +
+         "estimated, within 15 %; flash without the library functions of a target that computes in "
+         "software\n";
+}
+
+template <class Kind, class Counts>
+nlohmann::json counts_json(const Counts& counts) {
+  nlohmann::json all = nlohmann::json::object();
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    all[std::string(name(static_cast<Kind>(i)))] = counts[i];
+  return all;
+}
+
+/// What the costs are estimated from.
+nlohmann::json parts_json(const torsio::C99Program& program) {
+  nlohmann::json parts{
+      {"work", counts_json<torsio::CWork>(program.work)},
+      {"code", counts_json<torsio::CCode>(program.code)},
+      {"stack", counts_json<torsio::CStack>(torsio::c_stack(program.work, program.local_bytes,
+                                                            program.control_work.has_value()))}};
+  if (program.control_work) {
+    parts["control_work"] = counts_json<torsio::CWork>(*program.control_work);
+    parts["control_stack"] = counts_json<torsio::CStack>(
+        torsio::c_stack(*program.control_work, program.local_bytes, true));
+  }
+  return parts;
+}
+
+nlohmann::json cost_json(const torsio::C99Program& program, torsio::CReal real,
+                         const std::vector<const torsio::CTarget*>& targets) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const torsio::CTarget* target : targets) {
+    const torsio::CCost cost = torsio::c_cost(program, *target, real);
+    all.push_back({{"target", std::string(target->name)},
+                   {"flash_bytes", cost.flash},
+                   {"ram_bytes", cost.ram},
+                   {"stack_bytes", cost.step.stack},
+                   {"instructions", cost.step.instructions}});
+    if (cost.control)
+      all.back()["control"] = {{"stack_bytes", cost.control->stack},
+                               {"instructions", cost.control->instructions}};
+  }
+  return all;
+}
+
+}  // namespace
+
+void export_c99(ExportFlags& flags) {
+  const std::filesystem::path folder(flags.output);
+  const std::string header = (folder / (flags.c99 + ".h")).string();
+  const std::string source = (folder / (flags.c99 + ".c")).string();
+  const torsio::CReal real = real_of(flags.real);
+  torsio::C99Options options{.name = flags.c99, .real = real};
+  for (const std::string& each : flags.counts) options.counts.push_back(counts_of(each));
+  if (!flags.controller.empty()) options.controller = torsio::read_controller(flags.controller);
+  std::vector<const torsio::CTarget*> targets;
+  if (!flags.target.empty())
+    targets.push_back(&torsio::find_c_target(flags.target));
+  else
+    for (const torsio::CTarget& target : torsio::c_targets())
+      if ((real == torsio::CReal::single ? target.single : target.twofold) != nullptr)
+        targets.push_back(&target);
+  const auto flash = memory_of(flags.flash, "--flash");
+  const auto ram = memory_of(flags.ram, "--ram");
+  const auto clock_Hz = clock_of(flags.clock);
+  if ((flash || ram || clock_Hz) && flags.target.empty())
+    throw torsio::UsageError({.place = "--target",
+                              .problem = "--flash, --ram and --clock are those of one target",
+                              .advice = "Name it with --target."});
+  const torsio::ModelFile model = torsio::load_model(flags.model);
+  const torsio::C99Program program =
+      torsio::c99_program(model, options, std::filesystem::path(flags.model).filename().string());
+  if (!flags.target.empty()) {
+    const torsio::CCost cost = torsio::c_cost(program, *targets.front(), real);
+    require_room("the flash", cost.flash, flash, flags.target);
+    const double stack = std::max(cost.step.stack, cost.control ? cost.control->stack : 0.0);
+    require_room("the RAM", cost.ram + stack, ram, flags.target);
+    require_time(cost, model.settings.sample_rate_Hz, clock_Hz, flags.target);
+  }
+  make_folder(flags.output);
+  for (const std::string& file : {header, source}) require_new(flags, file);
+  write_text(header, program.header);
+  write_text(source, program.source);
+  if (flags.json.wants_tables())
+    print(fmt::format(
+        "{} and {} written: {}, {}, {} Hz\n{}", header, source, model.parameters.family(),
+        real == torsio::CReal::single ? "float" : "double", model.settings.sample_rate_Hz,
+        cost_table(flags.c99, program, real, model.settings.sample_rate_Hz, targets)));
+  nlohmann::json document{{"format", "torsio.export"},
+                          {"version", 1},
+                          {"family", std::string(model.parameters.family())},
+                          {"real", real == torsio::CReal::single ? "float" : "double"},
+                          {"header", header},
+                          {"source", source},
+                          {"table_bytes", program.table_bytes},
+                          {"state_bytes", program.state_bytes},
+                          {"parts", parts_json(program)},
+                          {"targets", cost_json(program, real, targets)}};
+  flags.json.write(document.dump(2) + "\n");
+}

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/output.hpp"
+
+/// The flags of `torsio export`. One of the targets is named: c99, onnx, mjcf or fmu.
+struct ExportFlags {
+  std::string model;
+  std::string c99;
+  std::string real;  ///< empty: that of the target
+  std::vector<std::string> counts;
+  std::string controller;
+  std::string output;
+  std::string target;
+  std::string flash;
+  std::string ram;
+  std::string clock;
+  bool overwrite = false;
+  JsonOutput json;
+};
+
+/// @throws UsageError if the file exists and is not to be replaced; Error if it cannot be written
+void require_new(const ExportFlags& flags, const std::string& file);
+
+void export_c99(ExportFlags& flags);

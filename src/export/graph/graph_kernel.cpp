@@ -1,0 +1,100 @@
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "export/graph/graph_families.hpp"
+#include "model/gaussian_process/kernel.hpp"
+
+namespace torsio {
+namespace {
+
+/// One kernel of an expression between a row of inputs and points, whose coordinates are `at(i)`: a constant row of one
+/// coordinate of each, or that of the row itself.
+template <class At>
+Row kernel_leaf(GraphBuilder& graph, const KernelNode& node, Row x, const At& at) {
+  const std::size_t inputs = x.width();
+  std::vector<double> weights;
+  for (const double scale : node.length_scales) weights.push_back(1.0 / (scale * scale));
+  if (weights.size() == 1) weights.resize(inputs, weights.front());
+  const auto kind = static_cast<KernelKind>(node.kind);
+  Row total = graph.constant(0.0);
+  for (std::size_t i = 0; i < inputs; ++i) {
+    const Row distance = x.part(i) - at(i);
+    Row term = distance * distance;
+    if (kind == KernelKind::linear) term = (x.part(i) - node.shape) * (at(i) - node.shape);
+    if (kind == KernelKind::periodic) {
+      const Row angle = distance * (std::numbers::pi / node.shape);
+      const Row sine =
+          graph.node(GraphOperation::sine, StepGraph::Type::real, angle.width(), {angle.index});
+      term = sine * sine;
+    }
+    total = total + term * weights[i];
+  }
+  Row value = total;
+  switch (kind) {
+    case KernelKind::linear: break;
+    case KernelKind::periodic: value = exponential(total * -2.0); break;
+    case KernelKind::rational_quadratic:
+      value = power(total * (0.5 / node.shape) + 1.0, graph.constant(-node.shape));
+      break;
+    case KernelKind::matern32: {
+      const Row root = square_root(total * 3.0);
+      value = (root + 1.0) * exponential(-root);
+      break;
+    }
+    case KernelKind::matern52: {
+      const Row root = square_root(total * 5.0);
+      value = (root + 1.0 + root * root * (1.0 / 3.0)) * exponential(-root);
+      break;
+    }
+    default: value = exponential(total * -0.5);
+  }
+  return value * (node.amplitude * node.amplitude);
+}
+
+template <class At>
+Row kernel_row(GraphBuilder& graph, const KernelExpression& kernel, Row x, const At& at) {
+  std::vector<Row> operands;
+  for (const KernelNode& node : kernel.nodes) {
+    const auto kind = static_cast<KernelKind>(node.kind);
+    if (kind != KernelKind::sum && kind != KernelKind::product) {
+      operands.push_back(kernel_leaf(graph, node, x, at));
+      continue;
+    }
+    const Row right = operands.back();
+    operands.pop_back();
+    operands.back() = kind == KernelKind::sum ? operands.back() + right : operands.back() * right;
+  }
+  return operands.back();
+}
+
+}  // namespace
+
+GraphEstimate add_parametric_gp(GraphBuilder& graph, const ParametricGp::Parameters& p, Row x) {
+  std::vector<double> factors;
+  for (const double scale : p.scaling.inputs.scale) factors.push_back(1.0 / scale);
+  const Row in = (x - graph.constant(p.scaling.inputs.centre)) * graph.constant(factors);
+  const Row covariance = kernel_row(graph, p.kernel, in, [&](std::size_t i) {
+    std::vector<double> coordinates;
+    for (std::size_t m = 0; m < p.inducing_points.rows; ++m)
+      coordinates.push_back(p.inducing_points(m, i));
+    return graph.constant(coordinates);
+  });
+  const Row mean = dot(covariance, graph.constant(p.weights));
+  const Row own = kernel_row(graph, p.kernel, in, [&](std::size_t i) { return in.part(i); });
+  const Row left = own - dot(covariance, product(covariance, graph.constant(p.explained)));
+  const Row std_dev = square_root(maximum(left, 0.0) + p.noise_variance) * p.scaling.target_scale;
+  const Row is_usable = is_finite(mean);
+  GraphEstimate estimate = plain_estimate(select(is_usable, mean * p.scaling.target_scale, 0.0) +
+                                          p.scaling.target_centre);
+  estimate.std_dev =
+      select(both(is_usable, is_finite(left)), std_dev, std::numeric_limits<double>::quiet_NaN());
+  estimate.fault = select(is_usable, 0.0, fault_number(Fault::model_not_finite));
+  return estimate;
+}
+
+}  // namespace torsio

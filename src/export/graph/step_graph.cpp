@@ -1,0 +1,185 @@
+#include "torsio/export/step_graph.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "estimate/guard_listing.hpp"
+#include "export/graph/graph_builder.hpp"
+#include "export/graph/graph_families.hpp"
+#include "export/graph/graph_guards.hpp"
+#include "export/graph/graph_memory.hpp"
+#include "export/graph/graph_models.hpp"
+#include "export/graph/graph_pipeline.hpp"
+#include "signal/pipeline_listing.hpp"
+#include "torsio/core/fault.hpp"
+#include "torsio/estimate/estimator_core.hpp"
+#include "torsio/model/any_model.hpp"
+
+namespace torsio {
+namespace {
+
+// The rules of an excursion, as `detail::EstimatorCore` has them.
+constexpr double kTicksPerReturn = 2.0;
+constexpr double kTicksOfReturn = 3.0;
+constexpr double kExcursionDoubt = 2.0;
+constexpr double kLargestShare = 2.0;
+/// More ticks than any memory lasts; a number of 32 bits counts as far.
+constexpr double kMaxMissed = 1e7;
+
+/// One tick of an estimator with its guards.
+class GuardedStep {
+ public:
+  GuardedStep(GraphBuilder& graph, const AnyModel::Parameters& parameters,
+              const GraphGuards& guards, const PipelineListing& listing)
+      : graph_(graph), parameters_(parameters), guards_(guards), listing_(listing) {}
+
+  StepGraph finished() {
+    const GuardListing& list = guards_.listing;
+    const Row raw = graph_.input(listing_.raw_inputs.size());
+    const Row is_measured = all_finite(raw);
+    // The state of the guards is read first: it decides whether the others are read at all.
+    const Row poisoned = graph_.truth_state("poisoned");
+    const Row missed = graph_.state("missed");
+    const Row has_run = graph_.truth_state("has_run");
+    const Row last_value = graph_.state("last_value");
+    const Row gap = either(poisoned, 0.5 < missed);
+    graph_.begin_scope(gap);
+    const GraphFeatures features =
+        add_pipeline(graph_, listing_, raw, guards_.settings.fallback.slope);
+    graph_.end_scope(is_not(is_measured), graph_.truth(false));
+    const Row is_usable_tick = both(is_measured, all_finite(features.all));
+    GraphExcursion excursion = add_excursion(graph_, guards_, features.all);
+    const Row in_jump =
+        list.assumes_jumps ? both(is_usable_tick, excursion.is_outside) : graph_.truth(false);
+    const Row is_accepted = both(is_usable_tick, is_not(in_jump));
+    const Row resumes = both(both(is_accepted, 0.5 < missed), has_run);
+
+    std::optional<GraphMemory> memory;
+    Row x = features.all;
+    const Row limited = limited_features(graph_, guards_, features.all);
+    if (!list.assumes_jumps) x = select(excursion.is_outside, limited, x);
+    if (list.has_memory) {
+      memory.emplace(graph_, list);
+      follow(*memory, features, excursion, limited, is_accepted, resumes, missed, has_run);
+    }
+    graph_.begin_scope(list.resets_model ? resumes : graph_.truth(false));
+    const GraphEstimate raw_estimate = add_model(graph_, parameters_, x);
+    const Row is_stepped = list.has_memory ? is_accepted : is_usable_tick;
+    const Row value_is_finite = is_finite(raw_estimate.value);
+    graph_.end_scope(is_not(is_stepped), is_not(value_is_finite));
+    Row memory_is_open = graph_.truth(false);
+    Row bound = graph_.constant(0.0);
+    if (memory) {
+      const Row reports =
+          either(is_not(value_is_finite),
+                 absolute(raw_estimate.fault - fault_number(Fault::model_not_finite)) < 0.5);
+      memory->lose(both(is_accepted, reports));
+      memory->store();
+      memory_is_open = memory->is_open();
+      bound = memory->bound();
+    }
+    if (list.assumes_jumps) excursion.fallback = select(in_jump, kBoundless, excursion.fallback);
+    const Row is_settled = both(features.is_settled, is_finite(features.start_std_dev));
+    const GraphEstimate out = guarded(graph_, guards_,
+                                      {.features = features,
+                                       .excursion = excursion,
+                                       .is_settled = is_settled,
+                                       .memory_is_open = memory_is_open,
+                                       .memory_bound = bound,
+                                       .last_value = last_value},
+                                      raw_estimate);
+    const Row value = select(is_usable_tick, out.value, last_value);
+    graph_.set_state("poisoned", both(either(poisoned, is_measured), is_not(is_accepted)));
+    graph_.set_state("missed", select(is_accepted, 0.0, minimum(missed + 1.0, kMaxMissed)));
+    graph_.set_state("has_run", either(has_run, is_stepped));
+    graph_.set_state("last_value", value);
+    return graph_.finished(
+        value, select(is_usable_tick, out.std_dev, kNotMeasured),
+        select(is_usable_tick, out.fault, fault_number(Fault::input_not_finite)));
+  }
+
+ private:
+  static constexpr double kBoundless = 1e30;
+
+  /// What the memory has received, or not, of the inputs of this tick and of those before it.
+  void follow(GraphMemory& memory, const GraphFeatures& features, const GraphExcursion& excursion,
+              Row limited, Row is_accepted, Row resumes, Row missed, Row has_run) {
+    const GuardListing& list = guards_.listing;
+    const double width = list.first_width;
+    const double travel = detail::kJumpFactor * guards_.settings.disturbances.largest_travel;
+    const Row share = std::isfinite(travel) && width > 0.0 ? minimum(missed * (travel / width), 1.0)
+                                                           : graph_.constant(1.0);
+    memory.interrupt(resumes, missed, share, true);
+    if (list.assumes_jumps) {  // no tick outside is accepted
+      memory.follow(is_accepted, features.all);
+      return;
+    }
+    const Row ticks = graph_.state("excursion_ticks");
+    const Row error = graph_.state("excursion_share");
+    const Row u = features.all.part(0);
+    const Row is_outside = both(both(is_accepted, excursion.is_outside), has_run);
+    const Row is_inside = both(is_accepted, is_not(excursion.is_outside));
+    // A motion beyond the range hardly exceeds it by more than its width: beyond, the sensor may be wrong.
+    const Row beyond = maximum(list.ranges.front().lowest - u, u - list.ranges.front().highest);
+    const Row is_beyond = width < beyond;
+    const Row worse =
+        width > 0.0 ? maximum(error, minimum(beyond * (1.0 / width) + 1.0, kLargestShare)) : error;
+    const Row returns = select(0.0 < error, kTicksOfReturn, 0.0);
+    const Row counted = ticks + select(is_beyond, 1.0, returns);
+    const Row ends = both(is_inside, 0.0 < ticks);
+    memory.doubt(ends, ticks * kExcursionDoubt, error);
+    const Row left = maximum(ticks - kTicksPerReturn, 0.0);
+    graph_.set_state("excursion_ticks", select(is_outside, counted, select(ends, left, ticks)));
+    graph_.set_state("excursion_share", select(both(is_outside, is_beyond), worse,
+                                               select(both(ends, left <= 0.0), 0.0, error)));
+    memory.follow(is_inside, features.all);
+    const Row missed_parts = absolute(features.all - limited);
+    const Row missed_first =
+        width > 0.0 ? minimum(missed_parts.part(0) * (1.0 / width), 1.0) : graph_.constant(1.0);
+    memory.interrupt(is_outside, graph_.constant(1.0), missed_first, false);
+    memory.miss_others(is_outside, missed_parts);
+  }
+
+  GraphBuilder& graph_;
+  const AnyModel::Parameters& parameters_;
+  const GraphGuards& guards_;
+  const PipelineListing& listing_;
+};
+
+StepGraph plain_step(GraphBuilder& graph, const ModelFile& model, const PipelineListing& listing) {
+  const Row raw = graph.input(listing.raw_inputs.size());
+  const Row never = graph.truth(false);
+  graph.begin_scope(never);
+  const GraphFeatures features = add_pipeline(graph, listing, raw, model.settings.fallback.slope);
+  graph.end_scope(never, never);
+  graph.begin_scope(never);
+  const GraphEstimate own = add_model(graph, model.parameters, features.all);
+  graph.end_scope(never, never);
+  return graph.finished(own.value, model_std_dev(graph, model.settings, own), own.fault);
+}
+
+}  // namespace
+
+StepGraph step_graph(const ModelFile& model, const StepGraphOptions& options) {
+  const AnyModel own(model.parameters);
+  const detail::EstimatorCore core(model.settings, own);
+  const FeaturePipeline pipeline(model.settings.features, model.settings.sample_rate_Hz);
+  const PipelineListing listing = pipeline.listing();
+  const GuardListing guards = core.listing();
+  GraphBuilder builder(options.is_single);
+  StepGraph graph =
+      options.has_guards
+          ? GuardedStep(builder, model.parameters, {model.settings, guards}, listing).finished()
+          : plain_step(builder, model, listing);
+  graph.raw_inputs = listing.raw_inputs;
+  graph.zeroed_channels = model.settings.zeroed_channels;
+  graph.target = model.settings.target;
+  graph.sample_rate_Hz = model.settings.sample_rate_Hz;
+  graph.family = std::string(model.parameters.family());
+  return graph;
+}
+
+}  // namespace torsio
