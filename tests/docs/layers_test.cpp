@@ -93,7 +93,8 @@ Layers layers() {
   }
   layers.uses = {{"runtime", {}},           {"files", {"runtime"}},
                  {"realtime", {"runtime"}}, {"arm", {"files", "runtime"}},
-                 {"link", {"runtime"}},     {"live", {"link", "runtime"}}};
+                 {"link", {"runtime"}},     {"live", {"link", "runtime"}},
+                 {"mujoco", {"runtime"}}};
   const std::string cmake = file_bytes(kRoot / "src/CMakeLists.txt");
   const std::regex library(R"(torsio_slow_library\((\w+)\s[^)]*?USES ([a-z ]+))");
   for (std::sregex_iterator at(cmake.begin(), cmake.end(), library); at != std::sregex_iterator();

@@ -85,12 +85,12 @@ TEST(PublicHeaders, AreThoseThatAUserIncludes) {
   EXPECT_THAT(not_reached, IsEmpty()) << "these belong into src";
 }
 
-TEST(PublicHeaders, AreAtMostAHundredAndEighty) {
+TEST(PublicHeaders, AreAtMostTwoHundred) {
   std::size_t headers = 0;
   for (const fs::directory_entry& entry :
        fs::recursive_directory_iterator(kRoot / "include/torsio"))
     headers += entry.is_regular_file() ? 1 : 0;
-  EXPECT_LE(headers, 180U);
+  EXPECT_LE(headers, 200U);
 }
 
 TEST(StartHeaders, ListFiveNamesThatTheyDeclare) {

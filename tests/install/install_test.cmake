@@ -1,6 +1,6 @@
 # cmake -DBUILD=<build tree> -DSOURCE=<tests/install/stranger> -DWORK=<scratch> -P install_test.cmake
-# Installs torsio into a scratch prefix, builds eight strangers' projects against it (one without the lab, one with it, one
-# that fits models, one with a real-time loop, one with an arm, one with a link, one that publishes where libwebsockets is installed, one in C where libtorsio.so is built) and runs them.
+# Installs torsio into a scratch prefix, builds nine strangers' projects against it (one without the lab, one with it, one
+# that fits models, one with a real-time loop, one with an arm, one with a link, one that publishes where libwebsockets is installed, one in MuJoCo where that is installed, one in C where libtorsio.so is built) and runs them.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -54,6 +54,15 @@ run(${torsio} fit ${WORK}/sweep.csv --model linear -o ${WORK}/joint.safetensors)
 run(${WORK}/build/stranger ${WORK}/joint.safetensors)
 if(NOT output MATCHES "torsio [0-9.]+: -?[0-9.]+ Nm")
   message(FATAL_ERROR "the stranger's program printed: ${output}")
+endif()
+if(EXISTS ${WORK}/prefix/include/torsio/mujoco)
+  run(${torsio} export ${WORK}/joint.safetensors --mjcf -o ${WORK}/elbow.xml)
+  run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_in_mujoco -B ${WORK}/build_mujoco -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+  run(${CMAKE_COMMAND} --build ${WORK}/build_mujoco)
+  run(${WORK}/build_mujoco/stranger_in_mujoco ${WORK}/joint.safetensors ${WORK}/elbow.xml)
+  if(NOT output MATCHES "a torque of -?[0-9.]+ Nm")
+    message(FATAL_ERROR "the stranger's spring printed: ${output}")
+  endif()
 endif()
 if(EXISTS ${WORK}/prefix/include/torsio.h)
   run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_in_c -B ${WORK}/build_c -DCMAKE_PREFIX_PATH=${WORK}/prefix)

@@ -26,7 +26,8 @@ struct Target {
 };
 
 void run(ExportFlags& flags) {
-  const Target targets[] = {{"--c99", !flags.c99.empty(), export_c99}};
+  const Target targets[] = {{"--c99", !flags.c99.empty(), export_c99},
+                            {"--mjcf", flags.mjcf, export_mjcf}};
   const Target* wanted = nullptr;
   for (const Target& target : targets) {
     if (!target.is_wanted) continue;
@@ -38,8 +39,12 @@ void run(ExportFlags& flags) {
   }
   if (wanted == nullptr)
     throw torsio::UsageError({.place = "torsio export",
-                              .expected = "a target: --c99 NAME",
+                              .expected = "a target: --c99 NAME or --mjcf",
                               .advice = "torsio export --help describes them."});
+  if (!flags.mjcf && (!flags.actuator.empty() || flags.linear_spring))
+    throw torsio::UsageError({.place = flags.linear_spring ? "--linear-spring" : "--actuator",
+                              .problem = "it belongs to --mjcf",
+                              .advice = std::string("Remove it, or ") + wanted->flag + "."});
   wanted->write(flags);
 }
 
@@ -69,7 +74,18 @@ void add_export(CLI::App& app) {
       "--controller", flags->controller,
       "FILE.yaml of torsio tune-loop: add the controller of the joint, with the model as "
       "the inverse of its spring");
-  verb->add_option("-o,--output", flags->output, "folder of the files of a C program")->required();
+  verb->add_flag("--mjcf", flags->mjcf,
+                 "a joint with this spring as a model of MuJoCo; -o FILE.xml, whose name without "
+                 "its ending is the prefix of all names in it");
+  verb->add_option("--actuator", flags->actuator,
+                   "inertias, gear, motor and friction of --mjcf: an actuator of torsio simulate "
+                   "--list, or a file of a data sheet (default dfki-50)");
+  verb->add_flag("--linear-spring", flags->linear_spring,
+                 "--mjcf with the linear fallback as the spring, which MuJoCo computes without "
+                 "torsio");
+  verb->add_option("-o,--output", flags->output,
+                   "folder of the files of a C program, or file of a model of MuJoCo")
+      ->required();
   verb->add_option(
       "--target", flags->target,
       "estimate the cost for this target only: cortex-m4f or cortex-m7 (--real double: cortex-m7)");

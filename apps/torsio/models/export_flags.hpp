@@ -17,6 +17,9 @@ struct ExportFlags {
   std::string flash;
   std::string ram;
   std::string clock;
+  bool mjcf = false;
+  std::string actuator;  ///< empty: the default of `--mjcf`
+  bool linear_spring = false;
   bool overwrite = false;
   JsonOutput json;
 };
@@ -25,3 +28,4 @@ struct ExportFlags {
 void require_new(const ExportFlags& flags, const std::string& file);
 
 void export_c99(ExportFlags& flags);
+void export_mjcf(ExportFlags& flags);
