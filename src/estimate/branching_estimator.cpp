@@ -12,18 +12,17 @@
 namespace torsio {
 namespace {
 
-/// The places of a record; the bytes of the states A and B follow.
-enum Place : std::size_t {
-  kHasBefore,  ///< 1 if A is a state, 0 if it is that after a reset
-  kHasAfter,   ///< 1 if B is a state, 0 if no tick was evaluated since the commit
-  kTime,       ///< [s] of the tick
-  kMissed,     ///< ticks that did not take place before it
-  kValue,
-  kStdDev,
-  kNovelty,
-  kFault,
-  kPlaces,
-};
+// The places of a record; the bytes of the states A and B follow.
+constexpr std::size_t kHasBefore = 0;  ///< 1 if A is a state, 0 if it is that after a reset
+constexpr std::size_t kHasAfter =
+    1;  ///< 1 if B is a state, 0 if no tick was evaluated since the commit
+constexpr std::size_t kTime = 2;    ///< [s] of the tick
+constexpr std::size_t kMissed = 3;  ///< ticks that did not take place before it
+constexpr std::size_t kValue = 4;
+constexpr std::size_t kStdDev = 5;
+constexpr std::size_t kNovelty = 6;
+constexpr std::size_t kFault = 7;
+constexpr std::size_t kPlaces = 8;
 
 /// Two times of a simulator that differ by less than this share of the period are the same.
 constexpr double kSameTime = 1e-6;
@@ -138,7 +137,7 @@ void BranchingEstimator::commit(std::span<double> record, double time_s) const n
   record[kMissed] = ticks - 1.0;
 }
 
-Estimate BranchingEstimator::last(std::span<const double> record) const noexcept {
+Estimate BranchingEstimator::last(std::span<const double> record) noexcept {
   const double fault = record[kFault];
   return {.value = record[kValue],
           .std_dev = record[kStdDev],

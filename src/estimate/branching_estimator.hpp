@@ -44,7 +44,7 @@ class BranchingEstimator {
   /// take place until then are a gap for the next one.
   void commit(std::span<double> record, double time_s) const noexcept TORSIO_REALTIME;
   /// What the last tick estimated.
-  [[nodiscard]] Estimate last(std::span<const double> record) const noexcept TORSIO_REALTIME;
+  [[nodiscard]] static Estimate last(std::span<const double> record) noexcept TORSIO_REALTIME;
   /// The state after as many ticks at rest, for at most `longest_s`, as filters and memory need to settle.
   void settle(std::span<double> record, std::span<const double> raw,
               double longest_s) const noexcept;

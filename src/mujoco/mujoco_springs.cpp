@@ -43,6 +43,7 @@ std::string name_of(const mjModel& model, int kind, int id) {
 
 std::vector<std::string> names_of(const mjModel& model, int kind, int count) {
   std::vector<std::string> names;
+  names.reserve(static_cast<std::size_t>(count));
   for (int id = 0; id < count; ++id) names.push_back(name_of(model, kind, id));
   return names;
 }
@@ -77,14 +78,14 @@ void check_actuator(const Place& place) {
   const mjModel& model = place.model;
   const int id = place.actuator;
   if (model.actuator_biastype[id] != mjBIAS_USER)
-    place.refuse("biastype=\"user\"", "another biastype");
+    place.refuse(R"(biastype="user")", "another biastype");
   if (model.actuator_gaintype[id] != mjGAIN_FIXED ||
       model.actuator_gainprm[static_cast<std::ptrdiff_t>(id) * mjNGAIN] != 0.0 ||
       model.actuator_dyntype[id] != mjDYN_NONE)
-    place.refuse("gaintype=\"fixed\", gainprm=\"0\" and no dyntype",
+    place.refuse(R"(gaintype="fixed", gainprm="0" and no dyntype)",
                  "an actuator whose force depends on its control");
   if (model.actuator_gear[static_cast<std::ptrdiff_t>(id) * 6] == 0.0)
-    place.refuse("gear=\"-1\" or another number but 0", "0");
+    place.refuse(R"(gear="-1" or another number but 0)", "0");
   if (model.actuator_trntype[id] != mjTRN_TENDON)
     place.refuse("the tendon of the deflection as its transmission", "another transmission");
 }
@@ -95,7 +96,7 @@ void find_hinges(Place& place) {
   const int tendon = model.actuator_trnid[static_cast<std::ptrdiff_t>(place.actuator) * 2];
   const int first = model.tendon_adr[tendon];
   const char* const expected =
-      "a fixed tendon of two hinges, the gear side with coef=\"1\" and the joint with coef=\"-1\"";
+      R"(a fixed tendon of two hinges, the gear side with coef="1" and the joint with coef="-1")";
   if (model.tendon_num[tendon] != 2)
     place.refuse(expected, fmt::format("a tendon of {} parts", model.tendon_num[tendon]));
   std::optional<int> gear;
@@ -304,11 +305,11 @@ struct MujocoSprings::Adapter {
   std::vector<Spring> springs = {};
 };
 
-MujocoSprings::MujocoSprings(mjModel& model, std::vector<MujocoSpring> springs,
+MujocoSprings::MujocoSprings(mjModel& model, const std::vector<MujocoSpring>& springs,
                              MujocoOptions options)
     : adapter_(std::make_unique<Adapter>()) {
   std::size_t next = options.first_userdata;
-  for (MujocoSpring& each : springs) {
+  for (const MujocoSpring& each : springs) {
     const Place place = place_of(model, each.actuator);
     if (std::ranges::find(adapter_->springs, place.actuator, &Adapter::Spring::actuator) !=
         adapter_->springs.end())
@@ -355,7 +356,7 @@ void MujocoSprings::commit(mjData& data) const noexcept {
 
 Estimate MujocoSprings::estimate(const mjData& data, std::size_t spring) const noexcept {
   const Adapter::Spring& found = adapter_->springs[spring];
-  return found.estimator.last(found.record(data));
+  return BranchingEstimator::last(found.record(data));
 }
 
 void MujocoSprings::settle(mjData& data, double longest_s) const noexcept {

@@ -73,7 +73,8 @@ class MujocoSprings {
   /// @throws UsageError for an unknown actuator, one that is not as above, a rate that does not fit to the timestep, a
   /// channel that MuJoCo does not have, a target that is not a torque in Nm, or too small a `nuserdata`; Error for a model
   /// whose state cannot be saved, or at more than 1024 adapters.
-  MujocoSprings(mjModel& model, std::vector<MujocoSpring> springs, MujocoOptions options = {});
+  MujocoSprings(mjModel& model, const std::vector<MujocoSpring>& springs,
+                MujocoOptions options = {});
   MujocoSprings(MujocoSprings&& other) noexcept;
   MujocoSprings& operator=(MujocoSprings&& other) noexcept;
   ~MujocoSprings();
