@@ -70,6 +70,7 @@ void bind_learning(py::module_& module);
 void bind_control(py::module_& module);
 void bind_arms(py::module_& module);
 void bind_links(py::module_& module);
+void bind_graphs(py::module_& module);
 
 }  // namespace torsio::python
 

@@ -72,4 +72,5 @@ PYBIND11_MODULE(_core, module) {
   bind_control(module);
   bind_arms(module);
   bind_links(module);
+  bind_graphs(module);
 }

@@ -34,8 +34,11 @@ class GraphInterpreter {
   Numbers rounded(std::size_t index, Numbers row) const {
     const StepGraph::Node& node = graph_.nodes[index];
     if (row.size() != node.width) throw std::logic_error("a node has another width");
-    if (node.type == StepGraph::Type::single ||
-        (graph_.is_single && node.type == StepGraph::Type::real))
+    const bool is_rounded =
+        node.type == StepGraph::Type::single ||
+        (node.type == StepGraph::Type::real && graph_.precision != GraphPrecision::twofold) ||
+        (node.type == StepGraph::Type::wide && graph_.precision == GraphPrecision::single);
+    if (is_rounded)
       for (double& x : row) x = static_cast<double>(static_cast<float>(x));
     return row;
   }
@@ -120,6 +123,7 @@ class GraphInterpreter {
         return out;
       }
       case Op::to_real:
+      case Op::to_wide:
       case Op::to_single: return operand(0);
     }
     throw std::logic_error("unknown operation");

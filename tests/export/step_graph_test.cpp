@@ -36,12 +36,13 @@ std::vector<std::vector<double>> smooth_motion(std::size_t ticks) {
 }
 
 /// @param tolerance as a share of the range of the torque
-void expect_equal_graph(const ModelFile& file, bool is_single, double tolerance,
+void expect_equal_graph(const ModelFile& file, GraphPrecision precision, double tolerance,
                         std::size_t ticks = 8000) {
   BasicEstimator<AnyModel> own(file.settings, AnyModel(file.parameters));
   for (const std::string& channel : file.settings.zeroed_channels) own.set_zero(channel, 0.0);
-  GraphInterpreter graph(step_graph(file, {.is_single = is_single}));
+  GraphInterpreter graph(step_graph(file, {.precision = precision}));
   ASSERT_EQ(graph.graph().raw_inputs, own.raw_inputs());
+  const bool is_single = precision != GraphPrecision::twofold;
   double lowest = 0.0;
   double highest = 0.0;
   double worst = 0.0;
@@ -51,7 +52,7 @@ void expect_equal_graph(const ModelFile& file, bool is_single, double tolerance,
   std::size_t other_faults = 0;
   std::size_t other_bars = 0;
   for (std::vector<double> raw : smooth_motion(ticks)) {
-    if (is_single)
+    if (precision == GraphPrecision::single)
       for (double& x : raw) x = static_cast<double>(static_cast<float>(x));
     const Estimate expected = own.step(raw);
     const Estimate found = graph.step(raw);
@@ -80,21 +81,25 @@ class StepGraphs : public testing::Test {};
 TYPED_TEST_SUITE(StepGraphs, Exported, ExportedName);
 
 TYPED_TEST(StepGraphs, InDoubleIsTheEstimator) {
-  expect_equal_graph(guarded(any_example<TypeParam>()), false, 1e-6);
+  expect_equal_graph(guarded(any_example<TypeParam>()), GraphPrecision::twofold, 1e-6);
 }
 
 TYPED_TEST(StepGraphs, InFloatIsNearlyTheEstimator) {
-  expect_equal_graph(guarded(any_example<TypeParam>()), true, 1e-4);
+  expect_equal_graph(guarded(any_example<TypeParam>()), GraphPrecision::single, 1e-4);
+}
+
+TYPED_TEST(StepGraphs, WithWideFeaturesIsNearerToTheEstimator) {
+  expect_equal_graph(guarded(any_example<TypeParam>()), GraphPrecision::mixed, 1e-5);
 }
 
 TYPED_TEST(StepGraphs, HasTheWholeLanguageOfItsFeatures) {
-  expect_equal_graph(remembering(any_example<TypeParam>()), false, 1e-6);
+  expect_equal_graph(remembering(any_example<TypeParam>()), GraphPrecision::twofold, 1e-6);
 }
 
 TYPED_TEST(StepGraphs, TreatsAnExcursionAsAJumpWhereJumpsAreNotKnown) {
   ModelFile file = guarded(any_example<TypeParam>());
   file.settings.disturbances.largest_step.clear();
-  expect_equal_graph(file, false, 1e-6);
+  expect_equal_graph(file, GraphPrecision::twofold, 1e-6);
 }
 
 TYPED_TEST(StepGraphs, HoldsTheLastValueWithoutInputsAndRecovers) {

@@ -27,6 +27,8 @@ struct Target {
 
 void run(ExportFlags& flags) {
   const Target targets[] = {{"--c99", !flags.c99.empty(), export_c99},
+                            {"--onnx", flags.onnx, export_onnx},
+                            {"--torchscript", flags.torchscript, export_torchscript},
                             {"--mjcf", flags.mjcf, export_mjcf}};
   const Target* wanted = nullptr;
   for (const Target& target : targets) {
@@ -74,6 +76,15 @@ void add_export(CLI::App& app) {
       "--controller", flags->controller,
       "FILE.yaml of torsio tune-loop: add the controller of the joint, with the model as "
       "the inverse of its spring");
+  verb->add_flag("--onnx", flags->onnx,
+                 "the estimator as an ONNX graph, its state as input and output; -o FILE.onnx "
+                 "(--real float, mixed or double, default double)");
+  verb->add_option("--layout", flags->layout,
+                   "of --onnx: estimator (the default), network (an mlp, gru or lstm from its "
+                   "features, as torsio "
+                   "import reads it) or newton (the same as Newton loads its neural drives)");
+  verb->add_flag("--torchscript", flags->torchscript,
+                 "names the command of the Python module that writes TorchScript");
   verb->add_flag("--mjcf", flags->mjcf,
                  "a joint with this spring as a model of MuJoCo; -o FILE.xml, whose name without "
                  "its ending is the prefix of all names in it");

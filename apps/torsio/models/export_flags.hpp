@@ -20,6 +20,9 @@ struct ExportFlags {
   bool mjcf = false;
   std::string actuator;  ///< empty: the default of `--mjcf`
   bool linear_spring = false;
+  bool onnx = false;
+  bool torchscript = false;
+  std::string layout;  ///< empty: the estimator
   bool overwrite = false;
   JsonOutput json;
 };
@@ -29,3 +32,6 @@ void require_new(const ExportFlags& flags, const std::string& file);
 
 void export_c99(ExportFlags& flags);
 void export_mjcf(ExportFlags& flags);
+void export_onnx(ExportFlags& flags);
+/// @throws UsageError with the command that writes it
+void export_torchscript(ExportFlags& flags);

@@ -46,10 +46,18 @@ enum class GraphOperation : std::uint8_t {
   largest,             ///< the largest column
   part,                ///< `width` columns from `first`
   joined,              ///< operands side by side
-  to_real,             ///< from a single number or a truth
+  to_real,             ///< a number or truth as a real, wide or single number
+  to_wide,
   to_single,
 };
 [[nodiscard]] std::string_view name(GraphOperation operation) noexcept;
+
+/// The numbers of a graph.
+enum class GraphPrecision : std::uint8_t {
+  single,  ///< 32 bits
+  mixed,  ///< 64 bits for inputs, state and features, whose differences need them; 32 bits for model and guards
+  twofold,  ///< 64 bits
+};
 
 /// One tick of an estimator as operations on rows: what a framework of tensors computes for many joints at once, one
 /// row for each. There are no branches and no loops: each guard selects.
@@ -61,7 +69,12 @@ enum class GraphOperation : std::uint8_t {
 /// tick without inputs is always a long gap, after which filters and model start again.
 struct StepGraph {
   using Index = std::uint32_t;
-  enum class Type : std::uint8_t { real, single, truth };
+  enum class Type : std::uint8_t {
+    real,    ///< a number of model and guards
+    wide,    ///< a number of inputs, state and pipeline
+    single,  ///< a number of a network: always 32 bits
+    truth,
+  };
 
   struct Node {
     GraphOperation operation = GraphOperation::constant;
@@ -69,7 +82,8 @@ struct StepGraph {
     std::size_t width = 1;
     std::vector<Index> operands = {};  ///< indices of earlier nodes
     std::size_t first = 0;
-    Matrix values = {};  ///< numbers, if it is a constant
+    bool is_common = false;  ///< the same for all joints: one row
+    Matrix values = {};      ///< numbers, if it is a constant
   };
   struct StatePart {
     std::string name;
@@ -85,7 +99,7 @@ struct StepGraph {
   std::size_t state_width = 0;
   std::vector<StatePart> state = {};
 
-  bool is_single = false;  ///< real numbers have 32 bits
+  GraphPrecision precision = GraphPrecision::twofold;
   std::vector<std::string> raw_inputs = {};
   std::vector<std::string> zeroed_channels = {};  ///< those from which the caller subtracts a zero
   std::string target = {};
@@ -94,7 +108,7 @@ struct StepGraph {
 };
 
 struct StepGraphOptions {
-  bool is_single = false;  ///< real numbers with 32 bits
+  GraphPrecision precision = GraphPrecision::twofold;
   bool has_guards = true;  ///< false: the value of the model alone, its own error bar and fault
 };
 

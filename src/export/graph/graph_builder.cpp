@@ -39,9 +39,7 @@ Row computed(GraphOperation operation, Row a) {
 
 /// A number of the type of the row beside it.
 Row beside(Row a, double value) {
-  if (a.graph->at(a.index).type != GraphType::single) return a.graph->constant(value);
-  Matrix one(1, 1, value);
-  return a.graph->single_constant(std::move(one));
+  return a.graph->constant(Matrix(1, 1, value), a.graph->at(a.index).type);
 }
 
 bool is_number(Row a, double value) {
@@ -88,6 +86,7 @@ std::string_view name(GraphOperation operation) noexcept {
     case GraphOperation::part: return "part";
     case GraphOperation::joined: return "joined";
     case GraphOperation::to_real: return "to_real";
+    case GraphOperation::to_wide: return "to_wide";
     case GraphOperation::to_single: break;
   }
   return "to_single";
@@ -103,16 +102,23 @@ Row Row::part(std::size_t first, std::size_t count) const {
   if (node.operation == GraphOperation::constant && node.values.rows == 1) {
     Matrix values(1, count);
     for (std::size_t j = 0; j < count; ++j) values(0, j) = node.values(0, first + j);
-    return node.type == GraphType::single ? graph->single_constant(std::move(values))
-                                          : graph->constant(std::move(values));
+    return graph->constant(std::move(values), node.type);
   }
   return graph->node(GraphOperation::part, node.type, count, {index}, first);
 }
 
-GraphBuilder::GraphBuilder(bool is_single) {
-  graph_.is_single = is_single;
-  node(GraphOperation::input, GraphType::real, 0, {});
-  node(GraphOperation::state, GraphType::real, 0, {});
+GraphBuilder::GraphBuilder(GraphPrecision precision) {
+  graph_.precision = precision;
+  node(GraphOperation::input, state_type(), 0, {});
+  node(GraphOperation::state, state_type(), 0, {});
+}
+
+StepGraph::Type GraphBuilder::state_type() const noexcept {
+  return graph_.precision == GraphPrecision::mixed ? GraphType::wide : GraphType::real;
+}
+
+StepGraph::Type GraphBuilder::number_type() const noexcept {
+  return is_wide_ ? state_type() : GraphType::real;
 }
 
 Row GraphBuilder::added(GraphNode node, const std::string& key) {
@@ -137,24 +143,19 @@ Row GraphBuilder::input(std::size_t width) {
   return {this, 0};
 }
 
-Row GraphBuilder::constant(Matrix values) {
+Row GraphBuilder::constant(Matrix values, GraphType type) {
   GraphNode node{.operation = GraphOperation::constant,
-                 .type = GraphType::real,
+                 .type = type,
                  .width = values.columns,
                  .values = std::move(values)};
   const std::string key = key_of(node);
   return added(std::move(node), key);
 }
 
+Row GraphBuilder::constant(Matrix values) { return constant(std::move(values), number_type()); }
 Row GraphBuilder::single_constant(Matrix values) {
-  GraphNode node{.operation = GraphOperation::constant,
-                 .type = GraphType::single,
-                 .width = values.columns,
-                 .values = std::move(values)};
-  const std::string key = key_of(node);
-  return added(std::move(node), key);
+  return constant(std::move(values), GraphType::single);
 }
-
 Row GraphBuilder::constant(double value) { return constant(Matrix(1, 1, value)); }
 
 Row GraphBuilder::constant(std::span<const double> values) {
@@ -164,67 +165,64 @@ Row GraphBuilder::constant(std::span<const double> values) {
 }
 
 Row GraphBuilder::truth(bool value) {
-  GraphNode node{.operation = GraphOperation::constant,
-                 .type = GraphType::truth,
-                 .width = 1,
-                 .values = Matrix(1, 1, value ? 1.0 : 0.0)};
-  const std::string key = key_of(node);
-  return added(std::move(node), key);
+  return constant(Matrix(1, 1, value ? 1.0 : 0.0), GraphType::truth);
+}
+
+Row GraphBuilder::as_type(Row row, GraphType type) {
+  if (at(row.index).type == type) return row;
+  if (type == GraphType::single) return to_single(row);
+  return node(type == GraphType::wide ? GraphOperation::to_wide : GraphOperation::to_real, type,
+              row.width(), {row.index});
 }
 
 void GraphBuilder::begin_scope(Row restarts) {
-  is_in_scope_ = true;
   scope_ = {.first = graph_.state_width, .first_part = graph_.state.size()};
   // Widths follow at the end. Two scopes are never equal: the place of the first state differs, or the first is empty.
-  scope_.before = node(GraphOperation::part, GraphType::real, 0, {1}, scope_.first).index;
-  scope_.cleared = scope_.before;
+  const Row before = node(GraphOperation::part, state_type(), 0, {1}, scope_.first);
+  Row cleared = before;
+  // A state is finite, so that a factor clears it: a selection takes longer.
   if (!restarts.is_constant())
-    scope_.cleared = node(GraphOperation::select, GraphType::real, 0,
-                          {restarts.index, constant(0.0).index, scope_.before})
-                         .index;
+    cleared = node(GraphOperation::multiply, state_type(), 0,
+                   {before.index, as_type(is_not(restarts), state_type()).index});
+  scope_.before = before.index;
+  scope_.cleared = cleared.index;
+  scope_.read = as_type(cleared, number_type()).index;
 }
 
-void GraphBuilder::end_scope(Row keeps, Row clears) {
-  is_in_scope_ = false;
-  const std::size_t width = graph_.state_width - scope_.first;
-  graph_.nodes[scope_.before].width = width;
-  graph_.nodes[scope_.cleared].width = width;
-  if (width == 0) return;
+GraphBuilder::Scope GraphBuilder::end_scope() {
+  scope_.end_part = graph_.state.size();
+  for (const GraphIndex index : {scope_.before, scope_.cleared, scope_.read})
+    graph_.nodes[index].width = graph_.state_width - scope_.first;
+  return scope_;
+}
+
+void GraphBuilder::finish(const Scope& scope, Row keeps, Row clears) {
+  if (scope.first_part == scope.end_part) return;
   std::vector<Row> next;
-  for (std::size_t i = scope_.first_part; i < graph_.state.size(); ++i)
+  for (std::size_t i = scope.first_part; i < scope.end_part; ++i)
     next.push_back({this, next_.at(graph_.state[i].name)});
-  const Row own = select(clears, 0.0, joined(next));
-  scope_.next = select(keeps, Row{this, scope_.before}, own).index;
-  scopes_.push_back(scope_);
+  const Row own = as_type(joined(next), state_type());
+  const Row before{this, scope.before};
+  const Row kept = clears.is_constant() ? before : before * as_type(keeps, state_type());
+  finished_[scope.first] = select(either(keeps, clears), kept, own).index;
 }
 
 Row GraphBuilder::state(const std::string& name, std::size_t width) {
   const std::size_t first = graph_.state_width;
   graph_.state.push_back({name, first, width});
   graph_.state_width += width;
-  if (is_in_scope_)
-    return node(GraphOperation::part, GraphType::real, width, {scope_.cleared},
-                first - scope_.first);
-  return node(GraphOperation::part, GraphType::real, width, {1}, first);
+  return node(GraphOperation::part, number_type(), width, {scope_.read}, first - scope_.first);
 }
 
 Row GraphBuilder::truth_state(const std::string& name) { return 0.5 < state(name); }
 
 void GraphBuilder::set_state(const std::string& name, Row next) {
-  const Row real = at(next.index).type == GraphType::real ? next : to_real(next);
-  next_[name] = real.index;
+  next_[name] = as_type(next, number_type()).index;
 }
 
 StepGraph GraphBuilder::finished(Row value, Row std_dev, Row fault) {
   std::vector<Row> next;
-  auto scope = scopes_.begin();
-  for (std::size_t i = 0, column = 0; i < graph_.state.size();) {
-    const bool is_scope = scope != scopes_.end() && scope->first_part == i;
-    next.push_back({this, is_scope ? scope->next : next_.at(graph_.state[i].name)});
-    column += next.back().width();
-    if (is_scope) ++scope;
-    while (i < graph_.state.size() && graph_.state[i].first < column) ++i;
-  }
+  for (const auto& [column, index] : finished_) next.push_back({this, index});
   graph_.nodes[1].width = graph_.state_width;
   const Row all = next.empty() ? Row{this, 1} : joined(next);
   std::vector<bool> is_used(graph_.nodes.size(), false);
@@ -241,7 +239,13 @@ StepGraph GraphBuilder::finished(Row value, Row std_dev, Row fault) {
     if (!is_used[i]) continue;
     place[i] = static_cast<GraphIndex>(pruned.nodes.size());
     pruned.nodes.push_back(graph_.nodes[i]);
-    for (GraphIndex& operand : pruned.nodes.back().operands) operand = place[operand];
+    GraphNode& node = pruned.nodes.back();
+    node.is_common =
+        node.operation != GraphOperation::input && node.operation != GraphOperation::state;
+    for (GraphIndex& operand : node.operands) {
+      operand = place[operand];
+      node.is_common = node.is_common && pruned.nodes[operand].is_common;
+    }
   }
   pruned.value = place[value.index];
   pruned.std_dev = place[std_dev.index];
@@ -344,12 +348,9 @@ Row dot(Row a, Row b) {
   const Row of = a.is_constant() ? b : a;
   Matrix column = a.graph->at(a.is_constant() ? a.index : b.index).values;
   std::swap(column.rows, column.columns);
-  return product(of, a.graph->constant(std::move(column)));
+  return product(of, a.graph->constant(std::move(column), a.graph->at(of.index).type));
 }
-Row to_real(Row a) {
-  if (a.graph->at(a.index).type == GraphType::real) return a;
-  return a.graph->node(GraphOperation::to_real, GraphType::real, a.width(), {a.index});
-}
+Row to_real(Row a) { return a.graph->as_type(a, GraphType::real); }
 Row to_single(Row a) {
   return a.graph->node(GraphOperation::to_single, GraphType::single, a.width(), {a.index});
 }
@@ -368,7 +369,7 @@ Row joined(std::span<const Row> rows) {
 Row hypotenuse(Row a, Row b) { return square_root(a * a + b * b); }
 Row interpolated(Row x, std::span<const double> knots, Row table, bool is_held) {
   return x.graph->node(is_held ? GraphOperation::held_interpolation : GraphOperation::interpolation,
-                       GraphType::real, table.width(),
+                       x.graph->at(x.index).type, table.width(),
                        {x.index, x.graph->constant(knots).index, table.index});
 }
 

@@ -28,27 +28,44 @@ struct Row {
 /// Adds nodes; equal ones are one.
 class GraphBuilder {
  public:
-  explicit GraphBuilder(bool is_single);
+  explicit GraphBuilder(GraphPrecision precision);
+
+  /// Whether the constants and states that follow are wide numbers.
+  void use_wide(bool is_wide) noexcept { is_wide_ = is_wide; }
 
   Row input(std::size_t width);
   Row constant(double value);
   Row constant(std::span<const double> values);
   Row constant(Matrix values);
+  Row constant(Matrix values, StepGraph::Type type);
   Row single_constant(Matrix values);
   Row truth(bool value);
   Row node(GraphOperation operation, StepGraph::Type type, std::size_t width,
            std::vector<StepGraph::Index> operands, std::size_t first = 0);
 
+  /// States beside each other.
+  struct Scope {
+    StepGraph::Index before = 0;   ///< its part of the state
+    StepGraph::Index cleared = 0;  ///< the same, 0 where it restarts
+    StepGraph::Index read = 0;     ///< the same as numbers of its type
+    std::size_t first = 0;         ///< column of the state
+    std::size_t first_part = 0;    ///< index of its first named state
+    std::size_t end_part = 0;
+  };
+
   /// The states from here to `end_scope` are read as 0 where `restarts` is true.
   void begin_scope(Row restarts);
-  /// Where `keeps` is true the scope's next states are those before this tick, also where it restarted. Where `clears` is
-  /// true they are 0.
-  void end_scope(Row keeps, Row clears);
+  Scope end_scope();
+  /// All states of the scope have been set. Where `keeps` is true they are those before this tick, also where it restarted;
+  /// where `clears` is true they are 0. Scopes are finished in any order.
+  void finish(const Scope& scope, Row keeps, Row clears);
 
-  /// A state of this tick. Outside of a scope it is the one before.
+  /// A state before this tick, within a scope.
   Row state(const std::string& name, std::size_t width = 1);
   Row truth_state(const std::string& name);
   void set_state(const std::string& name, Row next);
+
+  Row as_type(Row row, StepGraph::Type type);
 
   [[nodiscard]] const StepGraph::Node& at(StepGraph::Index index) const {
     return graph_.nodes[index];
@@ -58,21 +75,15 @@ class GraphBuilder {
   [[nodiscard]] StepGraph finished(Row value, Row std_dev, Row fault);
 
  private:
-  struct Scope {
-    StepGraph::Index before = 0;   ///< its part of the state
-    StepGraph::Index cleared = 0;  ///< the same, 0 where it restarts
-    std::size_t first = 0;         ///< column of the state
-    std::size_t first_part = 0;    ///< index of its first named state
-    StepGraph::Index next = 0;
-  };
-
   Row added(StepGraph::Node node, const std::string& key);
+  [[nodiscard]] StepGraph::Type state_type() const noexcept;
+  [[nodiscard]] StepGraph::Type number_type() const noexcept;
 
   StepGraph graph_;
   std::map<std::string, StepGraph::Index> known_;
   std::map<std::string, StepGraph::Index> next_;
-  std::vector<Scope> scopes_;  ///< those that have states
-  bool is_in_scope_ = false;
+  std::map<std::size_t, StepGraph::Index> finished_;  ///< next states, by the column of their scope
+  bool is_wide_ = false;
   Scope scope_;
 };
 

@@ -87,9 +87,8 @@ Row model_std_dev(GraphBuilder& graph, const EstimatorSettings& settings,
     const auto inner = std::span(table.edges).subspan(1, table.std_dev.size() - 1);
     // 1 for each edge below the value; the differences are 1 in its region only.
     const Row above = to_real(is_not(raw.value < graph.constant(inner)));
-    const Row inside = to_real(is_not(raw.value < raw.value));  // 1: a constant has no rows
-    const std::vector<Row> from{inside, above};
-    const std::vector<Row> to{above, 1.0 - inside};
+    const std::vector<Row> from{graph.constant(1.0), above};
+    const std::vector<Row> to{above, graph.constant(0.0)};
     of_region = product(joined(from) - joined(to), graph.constant(std::move(std_dev)));
   }
   const Row residual = evidence(of_region);

@@ -11,6 +11,7 @@ namespace torsio {
 /// there; what is infinite there after a reset has a truth beside it.
 class GraphMemory {
  public:
+  /// Within a scope of the builder.
   GraphMemory(GraphBuilder& graph, const GuardListing& guards);
 
   /// @param ticks a constant is 1

@@ -29,6 +29,20 @@ constexpr double kLargestShare = 2.0;
 /// More ticks than any memory lasts; a number of 32 bits counts as far.
 constexpr double kMaxMissed = 1e7;
 
+/// The features as numbers of the model, and what they are computed from in wide ones.
+GraphFeatures pipeline_features(GraphBuilder& graph, const PipelineListing& listing,
+                                const EstimatorSettings& settings, Row raw, Row restarts,
+                                Row keeps) {
+  graph.use_wide(true);
+  graph.begin_scope(restarts);
+  GraphFeatures features = add_pipeline(graph, listing, raw, settings.fallback.slope);
+  graph.finish(graph.end_scope(), keeps, graph.truth(false));
+  graph.use_wide(false);
+  features.all = to_real(features.all);
+  features.start_std_dev = to_real(features.start_std_dev);
+  return features;
+}
+
 /// One tick of an estimator with its guards.
 class GuardedStep {
  public:
@@ -40,16 +54,23 @@ class GuardedStep {
     const GuardListing& list = guards_.listing;
     const Row raw = graph_.input(listing_.raw_inputs.size());
     const Row is_measured = all_finite(raw);
-    // The state of the guards is read first: it decides whether the others are read at all.
+    const Row never = graph_.truth(false);
+    graph_.begin_scope(never);
     const Row poisoned = graph_.truth_state("poisoned");
     const Row missed = graph_.state("missed");
     const Row has_run = graph_.truth_state("has_run");
     const Row last_value = graph_.state("last_value");
-    const Row gap = either(poisoned, 0.5 < missed);
-    graph_.begin_scope(gap);
-    const GraphFeatures features =
-        add_pipeline(graph_, listing_, raw, guards_.settings.fallback.slope);
-    graph_.end_scope(is_not(is_measured), graph_.truth(false));
+    std::optional<GraphMemory> memory;
+    if (list.has_memory) {
+      memory.emplace(graph_, list);
+      if (!list.assumes_jumps) {
+        excursion_ticks_ = graph_.state("excursion_ticks");
+        excursion_error_ = graph_.state("excursion_share");
+      }
+    }
+    const GraphBuilder::Scope own = graph_.end_scope();
+    GraphFeatures features = pipeline_features(graph_, listing_, guards_.settings, raw,
+                                               either(poisoned, 0.5 < missed), is_not(is_measured));
     const Row is_usable_tick = both(is_measured, all_finite(features.all));
     GraphExcursion excursion = add_excursion(graph_, guards_, features.all);
     const Row in_jump =
@@ -57,19 +78,16 @@ class GuardedStep {
     const Row is_accepted = both(is_usable_tick, is_not(in_jump));
     const Row resumes = both(both(is_accepted, 0.5 < missed), has_run);
 
-    std::optional<GraphMemory> memory;
     Row x = features.all;
     const Row limited = limited_features(graph_, guards_, features.all);
     if (!list.assumes_jumps) x = select(excursion.is_outside, limited, x);
-    if (list.has_memory) {
-      memory.emplace(graph_, list);
+    if (memory)
       follow(*memory, features, excursion, limited, is_accepted, resumes, missed, has_run);
-    }
-    graph_.begin_scope(list.resets_model ? resumes : graph_.truth(false));
+    graph_.begin_scope(list.resets_model ? resumes : never);
     const GraphEstimate raw_estimate = add_model(graph_, parameters_, x);
     const Row is_stepped = list.has_memory ? is_accepted : is_usable_tick;
     const Row value_is_finite = is_finite(raw_estimate.value);
-    graph_.end_scope(is_not(is_stepped), is_not(value_is_finite));
+    graph_.finish(graph_.end_scope(), is_not(is_stepped), is_not(value_is_finite));
     Row memory_is_open = graph_.truth(false);
     Row bound = graph_.constant(0.0);
     if (memory) {
@@ -96,6 +114,7 @@ class GuardedStep {
     graph_.set_state("missed", select(is_accepted, 0.0, minimum(missed + 1.0, kMaxMissed)));
     graph_.set_state("has_run", either(has_run, is_stepped));
     graph_.set_state("last_value", value);
+    graph_.finish(own, never, never);
     return graph_.finished(
         value, select(is_usable_tick, out.std_dev, kNotMeasured),
         select(is_usable_tick, out.fault, fault_number(Fault::input_not_finite)));
@@ -117,8 +136,8 @@ class GuardedStep {
       memory.follow(is_accepted, features.all);
       return;
     }
-    const Row ticks = graph_.state("excursion_ticks");
-    const Row error = graph_.state("excursion_share");
+    const Row ticks = excursion_ticks_;
+    const Row error = excursion_error_;
     const Row u = features.all.part(0);
     const Row is_outside = both(both(is_accepted, excursion.is_outside), has_run);
     const Row is_inside = both(is_accepted, is_not(excursion.is_outside));
@@ -147,17 +166,18 @@ class GuardedStep {
   const AnyModel::Parameters& parameters_;
   const GraphGuards& guards_;
   const PipelineListing& listing_;
+  Row excursion_ticks_ = {};
+  Row excursion_error_ = {};  ///< the share of the range that may have been wrong in them
 };
 
 StepGraph plain_step(GraphBuilder& graph, const ModelFile& model, const PipelineListing& listing) {
   const Row raw = graph.input(listing.raw_inputs.size());
   const Row never = graph.truth(false);
-  graph.begin_scope(never);
-  const GraphFeatures features = add_pipeline(graph, listing, raw, model.settings.fallback.slope);
-  graph.end_scope(never, never);
+  const GraphFeatures features =
+      pipeline_features(graph, listing, model.settings, raw, never, never);
   graph.begin_scope(never);
   const GraphEstimate own = add_model(graph, model.parameters, features.all);
-  graph.end_scope(never, never);
+  graph.finish(graph.end_scope(), never, never);
   return graph.finished(own.value, model_std_dev(graph, model.settings, own), own.fault);
 }
 
@@ -169,7 +189,7 @@ StepGraph step_graph(const ModelFile& model, const StepGraphOptions& options) {
   const FeaturePipeline pipeline(model.settings.features, model.settings.sample_rate_Hz);
   const PipelineListing listing = pipeline.listing();
   const GuardListing guards = core.listing();
-  GraphBuilder builder(options.is_single);
+  GraphBuilder builder(options.precision);
   StepGraph graph =
       options.has_guards
           ? GuardedStep(builder, model.parameters, {model.settings, guards}, listing).finished()
