@@ -112,6 +112,7 @@ static void @copy_reference(@reference *to, const @reference *from) {
 
   void write_types() {
     std::vector<std::string> sample;
+    sample.reserve(kSampleAngles.size() + 2);
     for (const std::string_view angle : kSampleAngles)
       sample.push_back((unit_of(options_, angle) ? "int32_t " : "@real ") +
                        member_of(options_, angle));

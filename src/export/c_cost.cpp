@@ -213,6 +213,7 @@ const CTarget& find_c_target(std::string_view name) {
   const auto* const found = std::ranges::find(kTargets, name, &CTarget::name);
   if (found != kTargets.end()) return *found;
   std::vector<std::string> names;
+  names.reserve(kTargets.size());
   for (const CTarget& target : kTargets) names.emplace_back(target.name);
   throw UsageError({.place = "--target",
                     .expected = fmt::format("{}", fmt::join(names, ", ")),

@@ -105,6 +105,7 @@ $RESIDUAL$  return @plain(value);
     add_coefficients(static_cast<double>(thresholds.size()) * (knots.size() > 1 ? 2.0 : 1.0));
     if (knots.size() > 1) add_cell(knots);
     std::vector<double> stiffness;
+    stiffness.reserve(thresholds.size());
     for (const double threshold : thresholds) stiffness.push_back(1.0 / threshold);
     const std::string table = c_.table(name + "_stiffness", stiffness);
     c_.member(fmt::format("@real {}[{}]", name, thresholds.size()));

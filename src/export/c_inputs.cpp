@@ -51,6 +51,7 @@ std::pair<std::string, double> whole_sum(
 std::vector<CInput> c_inputs(const std::vector<std::string>& raw_inputs,
                              const EstimatorSettings& settings, const C99Options& options) {
   std::vector<CInput> inputs;
+  inputs.reserve(raw_inputs.size());
   for (const std::string& channel : raw_inputs)
     inputs.push_back({.channel = channel,
                       .unit = {},

@@ -1,17 +1,17 @@
 // Steps an ONNX estimator with onnxruntime-node over the rows of `torsio estimate -o` and compares.
-//   node onnx.mjs MODEL.onnx ESTIMATES.csv
+//   node onnx.mjs MODEL.onnx ESTIMATES.csv [ROWS]
 // Prints JSON: the largest difference of value and error bar as a share of the value's range, other faults, the time of a step,
 // and whether 64 joints in a batch give what they give alone.
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 
-const require = createRequire(process.cwd() + '/');
+const require = createRequire(import.meta.url);
 const ort = require('onnxruntime-node');
 
-const [file, estimates] = process.argv.slice(2);
+const [file, estimates, most] = process.argv.slice(2);
 const [header, ...lines] = fs.readFileSync(estimates, 'utf8').trim().split('\n');
 const columns = header.split(',');
-const rows = lines.map((line) => line.split(','));
+const rows = lines.slice(0, most === undefined ? lines.length : Number(most)).map((line) => line.split(','));
 
 const session = await ort.InferenceSession.create(file, { intraOpNumThreads: 1, interOpNumThreads: 1 });
 const metadata = JSON.parse(fs.readFileSync(`${file}.json`, 'utf8'));

@@ -144,10 +144,9 @@ Row GraphBuilder::input(std::size_t width) {
 }
 
 Row GraphBuilder::constant(Matrix values, GraphType type) {
-  GraphNode node{.operation = GraphOperation::constant,
-                 .type = type,
-                 .width = values.columns,
-                 .values = std::move(values)};
+  GraphNode node{
+      .operation = GraphOperation::constant, .type = type, .width = values.columns, .values = {}};
+  node.values = std::move(values);
   const std::string key = key_of(node);
   return added(std::move(node), key);
 }

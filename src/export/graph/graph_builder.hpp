@@ -66,6 +66,8 @@ class GraphBuilder {
   void set_state(const std::string& name, Row next);
 
   Row as_type(Row row, StepGraph::Type type);
+  /// As a number of the type that constants have now.
+  Row as_number(Row row) { return as_type(row, number_type()); }
 
   [[nodiscard]] const StepGraph::Node& at(StepGraph::Index index) const {
     return graph_.nodes[index];

@@ -69,6 +69,7 @@ class GreyBoxGraph {
                 const std::vector<double>& knots, std::size_t first) {
     const std::size_t count = thresholds.size();
     std::vector<double> stiffness;
+    stiffness.reserve(count);
     for (const double threshold : thresholds) stiffness.push_back(1.0 / threshold);
     const Row slips =
         limited(graph_.state(name, count) + change * graph_.constant(stiffness), -1.0, 1.0);

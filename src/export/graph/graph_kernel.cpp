@@ -74,7 +74,11 @@ Row kernel_row(GraphBuilder& graph, const KernelExpression& kernel, Row x, const
 
 }  // namespace
 
-GraphEstimate add_parametric_gp(GraphBuilder& graph, const ParametricGp::Parameters& p, Row x) {
+// In wide numbers: the variance is the difference of two nearly equal ones, and the weights are large.
+GraphEstimate add_parametric_gp(GraphBuilder& graph, const ParametricGp::Parameters& p,
+                                Row features) {
+  graph.use_wide(true);
+  const Row x = graph.as_number(features);
   std::vector<double> factors;
   for (const double scale : p.scaling.inputs.scale) factors.push_back(1.0 / scale);
   const Row in = (x - graph.constant(p.scaling.inputs.centre)) * graph.constant(factors);
@@ -94,7 +98,10 @@ GraphEstimate add_parametric_gp(GraphBuilder& graph, const ParametricGp::Paramet
   estimate.std_dev =
       select(both(is_usable, is_finite(left)), std_dev, std::numeric_limits<double>::quiet_NaN());
   estimate.fault = select(is_usable, 0.0, fault_number(Fault::model_not_finite));
-  return estimate;
+  graph.use_wide(false);
+  return {.value = to_real(estimate.value),
+          .std_dev = to_real(estimate.std_dev),
+          .fault = to_real(estimate.fault)};
 }
 
 }  // namespace torsio

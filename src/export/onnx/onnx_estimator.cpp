@@ -116,7 +116,7 @@ class EstimatorWriter {
         return onnx_.add("ReduceSum", inputs);
       }
       case GraphOperation::largest: {
-        const std::string out = fmt::format("largest_{}", operands[0]);
+        std::string out = fmt::format("largest_{}", operands[0]);
         OnnxGraph::set(onnx_.add_node("ReduceMax", operands, {out}), "axes",
                        std::vector<std::int64_t>{1});
         return out;
@@ -130,7 +130,7 @@ class EstimatorWriter {
       case GraphOperation::joined: {
         OnnxGraph::Names rows;
         for (const StepGraph::Index index : node.operands) rows.push_back(full(index));
-        const std::string out = fmt::format("joined_{}", ++joined_);
+        std::string out = fmt::format("joined_{}", ++joined_);
         OnnxGraph::set(onnx_.add_node("Concat", rows, {out}), "axis", std::int64_t{1});
         return out;
       }
@@ -144,7 +144,7 @@ class EstimatorWriter {
   }
 
   std::string cast(const std::string& name, int type) {
-    const std::string out = fmt::format("{}_as_{}", name, type);
+    std::string out = fmt::format("{}_as_{}", name, type);
     OnnxGraph::set(onnx_.add_node("Cast", {name}, {out}), "to", static_cast<std::int64_t>(type));
     return out;
   }

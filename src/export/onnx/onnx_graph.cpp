@@ -35,7 +35,7 @@ onnx::NodeProto& OnnxGraph::add_node(const std::string& operation, const Names& 
 
 std::string OnnxGraph::add(const std::string& operation, const Names& inputs,
                            const std::string& output) {
-  const std::string name = output.empty() ? fmt::format("v{}", ++names_) : output;
+  std::string name = output.empty() ? fmt::format("v{}", ++names_) : output;
   add_node(operation, inputs, {name});
   return name;
 }

@@ -114,7 +114,7 @@ class NetworkWriter {
 
  private:
   /// The order of Newton's inputs, by the features of the model.
-  std::vector<std::size_t> newton_order(const DriveInputs& inputs) {
+  static std::vector<std::size_t> newton_order(const DriveInputs& inputs) {
     std::vector<std::size_t> order = inputs.position_errors;
     order.insert(order.end(), inputs.speeds.begin(), inputs.speeds.end());
     return order;
