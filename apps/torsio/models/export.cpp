@@ -1,3 +1,4 @@
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -26,10 +27,10 @@ struct Target {
 };
 
 void run(ExportFlags& flags) {
-  const Target targets[] = {{"--c99", !flags.c99.empty(), export_c99},
-                            {"--onnx", flags.onnx, export_onnx},
-                            {"--torchscript", flags.torchscript, export_torchscript},
-                            {"--mjcf", flags.mjcf, export_mjcf}};
+  const std::array targets{
+      Target{"--c99", !flags.c99.empty(), export_c99}, Target{"--onnx", flags.onnx, export_onnx},
+      Target{"--torchscript", flags.torchscript, export_torchscript},
+      Target{"--mjcf", flags.mjcf, export_mjcf}, Target{"--fmi", !flags.fmi.empty(), export_fmu}};
   const Target* wanted = nullptr;
   for (const Target& target : targets) {
     if (!target.is_wanted) continue;
@@ -40,12 +41,17 @@ void run(ExportFlags& flags) {
     wanted = &target;
   }
   if (wanted == nullptr)
-    throw torsio::UsageError({.place = "torsio export",
-                              .expected = "a target: --c99 NAME or --mjcf",
-                              .advice = "torsio export --help describes them."});
+    throw torsio::UsageError(
+        {.place = "torsio export",
+         .expected = "a target: --c99 NAME, --onnx, --torchscript, --mjcf or --fmi",
+         .advice = "torsio export --help describes them."});
   if (!flags.mjcf && (!flags.actuator.empty() || flags.linear_spring))
     throw torsio::UsageError({.place = flags.linear_spring ? "--linear-spring" : "--actuator",
                               .problem = "it belongs to --mjcf",
+                              .advice = std::string("Remove it, or ") + wanted->flag + "."});
+  if (flags.compile && flags.fmi.empty())
+    throw torsio::UsageError({.place = "--compile",
+                              .problem = "it belongs to --fmi",
                               .advice = std::string("Remove it, or ") + wanted->flag + "."});
   wanted->write(flags);
 }
@@ -94,8 +100,15 @@ void add_export(CLI::App& app) {
   verb->add_flag("--linear-spring", flags->linear_spring,
                  "--mjcf with the linear fallback as the spring, which MuJoCo computes without "
                  "torsio");
+  verb->add_option("--fmi", flags->fmi,
+                   "an FMU for co-simulation of FMI 2 or 3, with the C program as its sources; -o "
+                   "NAME.fmu, NAME being its model identifier (--real float or double, default "
+                   "double)");
+  verb->add_flag("--compile", flags->compile,
+                 "--fmi with a library, which most importers need, for the machine of the C "
+                 "compiler $CC (default cc)");
   verb->add_option("-o,--output", flags->output,
-                   "folder of the files of a C program, or file of a model of MuJoCo")
+                   "folder of the files of a C program, or file of another target")
       ->required();
   verb->add_option(
       "--target", flags->target,

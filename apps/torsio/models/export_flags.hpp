@@ -23,6 +23,8 @@ struct ExportFlags {
   bool onnx = false;
   bool torchscript = false;
   std::string layout;  ///< empty: the estimator
+  std::string fmi;     ///< version; empty: none
+  bool compile = false;
   bool overwrite = false;
   JsonOutput json;
 };
@@ -31,6 +33,7 @@ struct ExportFlags {
 void require_new(const ExportFlags& flags, const std::string& file);
 
 void export_c99(ExportFlags& flags);
+void export_fmu(ExportFlags& flags);
 void export_mjcf(ExportFlags& flags);
 void export_onnx(ExportFlags& flags);
 /// @throws UsageError with the command that writes it
