@@ -116,7 +116,7 @@ _LATER = {
 def __getattr__(name: str) -> Any:
     import importlib
 
-    if name in ("link", "plot"):
+    if name in ("link", "plot", "torch"):
         return importlib.import_module(f"torsio.{name}")
     for module, names in _LATER.items():
         if name in names.split():

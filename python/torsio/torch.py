@@ -16,8 +16,14 @@ import sys
 from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
-import torch
-from torch import Tensor, nn
+
+try:
+    import torch
+    from torch import Tensor, nn
+except ModuleNotFoundError as error:
+    if error.name != "torch":
+        raise
+    raise ImportError("torsio.torch needs PyTorch. Debian: apt install python3-torch", name="torch") from error
 
 from . import _core
 from ._core import Model, UsageError
