@@ -139,6 +139,10 @@ class Estimator(nn.Module):
         if operation == "constant":
             return getattr(self, self._names[index])
         a = rows[operands[0]]
+        if operation == "maximum":
+            inner = self._nodes[operands[0]]
+            if inner[0] == "minimum" and self._is_constant(operands[1]) and self._is_constant(inner[3][1]):
+                return torch.clamp(rows[inner[3][0]], rows[operands[1]], rows[inner[3][1]])
         if operation in _UNARY:
             return _UNARY[operation](a)
         if operation in _BINARY:
@@ -159,6 +163,9 @@ class Estimator(nn.Module):
         if operation in ("to_real", "to_wide", "to_single"):
             return a.to(self._types[kind])
         return self._interpolated(index, operation == "held_interpolation", a, width)
+
+    def _is_constant(self, index: int) -> bool:
+        return bool(self._nodes[index][0] == "constant")
 
     def _interpolated(self, index: int, is_held: bool, x: Tensor, width: int) -> Tensor:
         cell = torch.bucketize(x[0], getattr(self, f"_knots_{index}"), right=True)

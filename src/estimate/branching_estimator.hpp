@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
@@ -51,7 +52,7 @@ class BranchingEstimator {
 
  private:
   struct Copy {
-    explicit Copy(const Estimator& of) : estimator(of) {}
+    explicit Copy(Estimator of) : estimator(std::move(of)) {}
     Estimator estimator;
     std::atomic_flag is_used = {};
   };

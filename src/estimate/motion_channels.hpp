@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string_view>
 
 namespace torsio {
@@ -14,7 +15,7 @@ struct MotionChannel {
 };
 
 /// The channels that a simulator of rigid bodies has for each joint with a spring.
-inline constexpr MotionChannel kMotionChannels[] = {
+inline constexpr auto kMotionChannels = std::to_array<MotionChannel>({
     {.name = "gear_angle_rad", .gear = 1.0},
     {.name = "joint_angle_rad", .joint = 1.0},
     {.name = "spring_deflection_rad", .gear = 1.0, .joint = -1.0},
@@ -23,7 +24,7 @@ inline constexpr MotionChannel kMotionChannels[] = {
     {.name = "joint_speed_rad_s", .joint = 1.0, .is_speed = true},
     {.name = "spring_deflection_rate_rad_s", .gear = 1.0, .joint = -1.0, .is_speed = true},
     {.name = "motor_speed_rad_s", .gear = 1.0, .is_speed = true, .is_of_motor = true},
-};
+});
 
 /// Null for another channel.
 [[nodiscard]] constexpr const MotionChannel* find_motion_channel(std::string_view name) noexcept {

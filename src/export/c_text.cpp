@@ -149,7 +149,8 @@ std::string CText::functions() const {
   std::string text = functions_;
   // From the last to the first, since each may call those before it.
   for (const CMathFunction& function : std::views::reverse(c_math(real_)))
-    if (text.find(filled(function.call)) != std::string::npos) text = filled(function.text) + text;
+    if (text.find(filled(function.call)) != std::string::npos)
+      text.insert(0, filled(function.text));
   return text;
 }
 

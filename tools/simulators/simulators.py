@@ -109,7 +109,7 @@ def prepare(torsio, folder, data):
 
 
 def check_onnx(torsio, models, failures):
-    table = Table('model', 'real', 'file B', 'rows', 'value', 'error bar', 'other faults', 'batch of 64', 'us a step')
+    table = Table('model', 'real', 'file B', 'rows', 'value', 'error bar', 'other faults', 'batch of 64', 'us per step')
     for name, model, estimates in models:
         for real in ('double', 'mixed', 'float'):
             file = model.with_suffix(f'.{real}.onnx')

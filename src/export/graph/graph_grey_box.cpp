@@ -195,14 +195,16 @@ class GreyBoxGraph {
     std::vector<Row> inputs{x_};
     if (!terms_.thresholds.empty()) inputs.push_back(slips);
     const Row y = joined(inputs);
+    // An input that was constant in training has no border: any other value leaves it by more.
+    constexpr double kNoBorder = 1e30;
     std::vector<double> per_border;
-    for (std::size_t j = 0; j < y.width(); ++j)
-      per_border.push_back(1.0 /
-                           (GreyBoxResidual::kBorder * (learned.highest[j] - learned.lowest[j])));
+    for (std::size_t j = 0; j < y.width(); ++j) {
+      const double border = GreyBoxResidual::kBorder * (learned.highest[j] - learned.lowest[j]);
+      per_border.push_back(border > 0.0 ? 1.0 / border : kNoBorder);
+    }
     const Row left_by =
         maximum(graph_.constant(learned.lowest) - y, y - graph_.constant(learned.highest));
-    // An input that was constant in training has no border.
-    const Row borders = select(0.0 < left_by, left_by * graph_.constant(per_border), 0.0);
+    const Row borders = maximum(left_by, 0.0) * graph_.constant(per_border);
     const Row share = maximum(1.0 - largest(borders), 0.0);
     const Row correction = network_row(graph_, *network, y);
     const Row is_usable = both(is_finite(correction), 0.0 < share);
