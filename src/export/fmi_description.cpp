@@ -124,9 +124,9 @@ std::string_view role_attributes(FmiRole role) {
 }
 
 std::string variable_text(const FmiVariable& variable, std::size_t reference, bool is_two) {
-  const std::string common = fmt::format(
-      "name=\"{}\" valueReference=\"{}\" {} description=\"{}\"", fmi_text(variable.name), reference,
-      role_attributes(variable.role), fmi_text(variable.description));
+  const std::string common =
+      fmt::format(R"(name="{}" valueReference="{}" {} description="{}")", fmi_text(variable.name),
+                  reference, role_attributes(variable.role), fmi_text(variable.description));
   const bool has_start = variable.role == FmiRole::input || variable.role == FmiRole::zero;
   const std::string type =
       variable.role == FmiRole::fault ? "Enumeration" : std::string(is_two ? "Real" : "Float64");

@@ -79,31 +79,44 @@ std::string output_of_compiler(const std::string& compiler,
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  const std::string text = bytes_of(log);
+  std::string text = bytes_of(log);
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
     throw Error({.place = compiler, .problem = "the C compiler failed:\n" + text});
   return text;
 }
 
-/// The folder of the library, from the compiler's name of its machine: "x86_64-linux-gnu".
-std::string platform_of(const std::string& machine, FmiVersion version) {
-  const std::string processor = machine.substr(0, machine.find('-'));
-  const bool is_linux = machine.find("linux") != std::string::npos;
-  const bool is_32 = processor.size() == 4 && processor.front() == 'i' && processor.ends_with("86");
-  if (version == FmiVersion::two) {
-    if (is_linux && processor == "x86_64") return "linux64";
-    if (is_linux && is_32) return "linux32";
-    throw Error(
-        {.place = "FMI 2 with a compiled library",
-         .expected = "a compiler for Linux on x86 or x86_64: FMI 2 has no folder for others",
-         .found = machine,
-         .advice = "Take --fmi 3, or leave out --compile."});
+/// The processor of an ELF library as FMI 3 names it, empty if it has no name for it. The compiler's -dumpmachine does not
+/// depend on options such as -m32.
+std::string processor_of(const std::string& library) {
+  constexpr std::size_t kHeadBytes = 20;
+  if (library.size() < kHeadBytes ||
+      !library.starts_with("\x7f"
+                           "ELF") ||
+      library[5] != 1)
+    return {};
+  const bool is_64 = library[4] == 2;
+  switch (static_cast<unsigned char>(library[18]) + 256 * static_cast<unsigned char>(library[19])) {
+    case 3: return "x86";
+    case 40: return "aarch32";
+    case 62: return is_64 ? "x86_64" : "";
+    case 183: return is_64 ? "aarch64" : "";
+    case 243: return is_64 ? "riscv64" : "riscv32";
+    default: return {};
   }
-  if (is_linux && !processor.empty()) return (is_32 ? "x86" : processor) + "-linux";
+}
+
+/// The folder of a library for Linux.
+std::string platform_of(const std::string& processor, FmiVersion version) {
+  if (version == FmiVersion::three && !processor.empty()) return processor + "-linux";
+  if (processor == "x86_64") return "linux64";
+  if (processor == "x86") return "linux32";
   throw Error({.place = "an FMU with a compiled library",
-               .expected = "a compiler for Linux",
-               .found = machine,
-               .advice = "Leave out --compile."});
+               .expected = version == FmiVersion::two
+                               ? "a compiler for x86 or x86_64: FMI 2 has no folder for others"
+                               : "a compiler for x86, x86_64, ARM or RISC-V",
+               .found = processor.empty() ? "another processor" : processor,
+               .advice = version == FmiVersion::two ? "Take --fmi 3, or leave out --compile."
+                                                    : "Leave out --compile."});
 }
 
 }  // namespace
@@ -112,7 +125,11 @@ void compile_fmu(Fmu& fmu, const std::string& compiler) {
   const CompileFolder folder;
   std::string machine = output_of_compiler(compiler, {"-dumpmachine"}, folder);
   machine.erase(machine.find_last_not_of(" \r\n") + 1);
-  const std::string platform = platform_of(machine, fmu.version);
+  if (machine.find("linux") == std::string::npos)
+    throw Error({.place = "an FMU with a compiled library",
+                 .expected = "a compiler for Linux",
+                 .found = machine,
+                 .advice = "Leave out --compile."});
   std::vector<std::string> arguments{"-std=c99",
                                      "-O2",
                                      "-ffp-contract=off",
@@ -128,9 +145,9 @@ void compile_fmu(Fmu& fmu, const std::string& compiler) {
     if (path.ends_with(".c")) arguments.push_back(path);
   }
   static_cast<void>(output_of_compiler(compiler, arguments, folder));
-  fmu.files.push_back(
-      {fmt::format("binaries/{}/{}.so", platform, fmu.name), bytes_of(folder.file("library"))});
-  fmu.platform = platform;
+  const std::string library = bytes_of(folder.file("library"));
+  fmu.platform = platform_of(processor_of(library), fmu.version);
+  fmu.files.push_back({fmt::format("binaries/{}/{}.so", fmu.platform, fmu.name), library});
 }
 
 }  // namespace torsio
