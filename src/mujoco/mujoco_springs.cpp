@@ -158,6 +158,7 @@ std::optional<Reading> mapped(const Place& place, const MujocoSpring& spring,
 
 std::vector<std::string_view> known_channels() {
   std::vector<std::string_view> names;
+  names.reserve(kMotionChannels.size());
   for (const MotionChannel& each : kMotionChannels) names.push_back(each.name);
   return names;
 }

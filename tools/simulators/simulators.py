@@ -25,6 +25,10 @@ LARGEST_STEP_MS = 0.9
 SPRING = 'gear_angle_rad - joint_angle_rad'
 TWO = f'{SPRING}, lowpass(rate({SPRING}), 10Hz)'
 THREE = f'{TWO}, lowpass(rate(joint_angle_rad), 20Hz)'
+# Every operation of expressions.
+ALL = (f'stop({SPRING}, 5mrad) + 0.1 * dahl({SPRING}, 2mrad), lowpass(rate(lag({SPRING}, 3)), 10Hz) + sin(joint_angle_rad) * '
+       'exp(-abs(joint_angle_rad)) + min(gear_angle_rad, 0) ^ 2 + sqrt(abs(gear_angle_rad)) + atan(joint_angle_rad) + '
+       'cos(joint_angle_rad) + tanh(gear_angle_rad) + sign(gear_angle_rad) + max(joint_angle_rad, 0) / 2')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,6 +41,7 @@ class Case:
 
 CASES = [
     Case('linear', 'linear'),
+    Case('linear of every operation', 'linear', (), ALL),
     Case('linear_coulomb', 'linear_coulomb'),
     Case('polynomial', 'polynomial'),
     Case('maxwell_slip', 'maxwell_slip'),

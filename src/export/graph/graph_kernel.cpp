@@ -28,8 +28,8 @@ Row kernel_leaf(GraphBuilder& graph, const KernelNode& node, Row x, const At& at
     if (kind == KernelKind::linear) term = (x.part(i) - node.shape) * (at(i) - node.shape);
     if (kind == KernelKind::periodic) {
       const Row angle = distance * (std::numbers::pi / node.shape);
-      const Row sine =
-          graph.node(GraphOperation::sine, StepGraph::Type::real, angle.width(), {angle.index});
+      const Row sine = graph.node(GraphOperation::sine, graph.at(angle.index).type, angle.width(),
+                                  {angle.index});
       term = sine * sine;
     }
     total = total + term * weights[i];

@@ -17,7 +17,7 @@ using Value = PipelineListing::Value;
 
 Row computed_row(Operation operation, Row a, Row b) {
   const auto of_one = [&](GraphOperation wanted) {
-    return a.graph->node(wanted, StepGraph::Type::real, a.width(), {a.index});
+    return a.graph->node(wanted, a.graph->at(a.index).type, a.width(), {a.index});
   };
   switch (operation) {
     case Operation::add: return a + b;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,8 +36,6 @@ std::string operator_of(GraphOperation operation) {
     case GraphOperation::tangent: return "Tanh";
     case GraphOperation::sigmoid: return "Sigmoid";
     case GraphOperation::sine: return "Sin";
-    case GraphOperation::cosine: return "Cos";
-    case GraphOperation::arc_tangent: return "Atan";
     case GraphOperation::less: return "Less";
     case GraphOperation::less_or_equal: return "LessOrEqual";
     case GraphOperation::both: return "And";
@@ -134,6 +133,16 @@ class EstimatorWriter {
         OnnxGraph::set(onnx_.add_node("Concat", rows, {out}), "axis", std::int64_t{1});
         return out;
       }
+      // ONNX Runtime has neither in 64 bits.
+      case GraphOperation::cosine: {
+        const Matrix quarter(1, 1, std::numbers::pi / 2.0);
+        return onnx_.add("Sin", {onnx_.add("Add", {operands[0], constant(quarter, node.type)})});
+      }
+      case GraphOperation::arc_tangent: {
+        const std::string single = cast(operands[0], OnnxType::FLOAT);
+        const std::string angle = onnx_.add("Atan", {single});
+        return cast(angle, node.type == StepGraph::Type::wide ? wide_ : real_);
+      }
       case GraphOperation::to_real: return cast(operands[0], real_);
       case GraphOperation::to_wide: return cast(operands[0], wide_);
       case GraphOperation::to_single: return cast(operands[0], OnnxType::FLOAT);
@@ -144,7 +153,7 @@ class EstimatorWriter {
   }
 
   std::string cast(const std::string& name, int type) {
-    std::string out = fmt::format("{}_as_{}", name, type);
+    std::string out = fmt::format("{}_as_{}_{}", name, type, ++joined_);
     OnnxGraph::set(onnx_.add_node("Cast", {name}, {out}), "to", static_cast<std::int64_t>(type));
     return out;
   }
