@@ -17,7 +17,7 @@ struct FmiVariables {
   std::string target;               ///< name of the value
   double period_s = 0.0;
 
-  [[nodiscard]] std::size_t first_input() const noexcept { return 1; }
+  [[nodiscard]] static std::size_t first_input() noexcept { return 1; }
   [[nodiscard]] std::size_t first_zero() const noexcept { return 1 + inputs.size(); }
   [[nodiscard]] std::size_t value() const noexcept { return first_zero() + zeros.size(); }
   [[nodiscard]] std::size_t std_dev() const noexcept { return value() + 1; }

@@ -27,7 +27,7 @@ struct GraphMotion {
 [[nodiscard]] GraphEstimate add_network(GraphBuilder& graph, const Gru::Parameters& p, Row x);
 [[nodiscard]] GraphEstimate add_network(GraphBuilder& graph, const Lstm::Parameters& p, Row x);
 [[nodiscard]] GraphEstimate add_parametric_gp(GraphBuilder& graph,
-                                              const ParametricGp::Parameters& p, Row x);
+                                              const ParametricGp::Parameters& p, Row features);
 
 /// The output of a static network for these inputs, without its scaling's fault.
 [[nodiscard]] Row network_row(GraphBuilder& graph, const Mlp::Parameters& p, Row x);
