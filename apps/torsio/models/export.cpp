@@ -27,10 +27,12 @@ struct Target {
 };
 
 void run(ExportFlags& flags) {
-  const std::array targets{
-      Target{"--c99", !flags.c99.empty(), export_c99}, Target{"--onnx", flags.onnx, export_onnx},
-      Target{"--torchscript", flags.torchscript, export_torchscript},
-      Target{"--mjcf", flags.mjcf, export_mjcf}, Target{"--fmi", !flags.fmi.empty(), export_fmu}};
+  const std::array targets{Target{"--c99", !flags.c99.empty(), export_c99},
+                           Target{"--onnx", flags.onnx, export_onnx},
+                           Target{"--torchscript", flags.torchscript, export_torchscript},
+                           Target{"--mjcf", flags.mjcf, export_mjcf},
+                           Target{"--fmi", !flags.fmi.empty(), export_fmu},
+                           Target{"--warp", flags.warp, export_warp}};
   const Target* wanted = nullptr;
   for (const Target& target : targets) {
     if (!target.is_wanted) continue;
@@ -43,7 +45,7 @@ void run(ExportFlags& flags) {
   if (wanted == nullptr)
     throw torsio::UsageError(
         {.place = "torsio export",
-         .expected = "a target: --c99 NAME, --onnx, --torchscript, --mjcf or --fmi",
+         .expected = "a target: --c99 NAME, --onnx, --torchscript, --mjcf, --fmi or --warp",
          .advice = "torsio export --help describes them."});
   if (!flags.mjcf && (!flags.actuator.empty() || flags.linear_spring))
     throw torsio::UsageError({.place = flags.linear_spring ? "--linear-spring" : "--actuator",
@@ -107,6 +109,10 @@ void add_export(CLI::App& app) {
   verb->add_flag("--compile", flags->compile,
                  "--fmi with a library, which most importers need, for the machine of the C "
                  "compiler $CC (default cc)");
+  verb->add_flag("--warp", flags->warp,
+                 "the estimator as a kernel of NVIDIA Warp for MuJoCo-Warp and Newton; -o NAME.py, "
+                 "NAME being that of its Python module (--real float, mixed or double, default "
+                 "mixed)");
   verb->add_option("-o,--output", flags->output,
                    "folder of the files of a C program, or file of another target")
       ->required();

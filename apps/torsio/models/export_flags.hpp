@@ -5,7 +5,7 @@
 
 #include "common/output.hpp"
 
-/// The flags of `torsio export`. One of the targets is named: c99, onnx, mjcf or fmu.
+/// The flags of `torsio export`. One of the targets is named: c99, onnx, torchscript, mjcf, fmi or warp.
 struct ExportFlags {
   std::string model;
   std::string c99;
@@ -25,6 +25,7 @@ struct ExportFlags {
   std::string layout;  ///< empty: the estimator
   std::string fmi;     ///< version; empty: none
   bool compile = false;
+  bool warp = false;
   bool overwrite = false;
   JsonOutput json;
 };
@@ -38,3 +39,4 @@ void export_mjcf(ExportFlags& flags);
 void export_onnx(ExportFlags& flags);
 /// @throws UsageError with the command that writes it
 void export_torchscript(ExportFlags& flags);
+void export_warp(ExportFlags& flags);
