@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "export/warp_module.hpp"
+#include "export/warp_table.hpp"
 
 namespace torsio {
 namespace {
@@ -53,44 +54,6 @@ class WarpTypes {
   GraphPrecision precision_;
 };
 
-std::string python_number(double value, int bits) {
-  if (std::isnan(value)) return "float(\"nan\")";
-  if (std::isinf(value)) return value > 0.0 ? "float(\"inf\")" : "float(\"-inf\")";
-  const std::string text =
-      bits == 32 ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{}", value);
-  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
-}
-
-/// Numbers that the kernel reads, of one type.
-class WarpTable {
- public:
-  explicit WarpTable(int bits) : bits_(bits) {}
-  std::size_t add(const Matrix& values) {
-    std::string text;
-    for (const double value : values.values) text += python_number(value, bits_) + ", ";
-    const auto [place, is_new] = known_.try_emplace(text, size_);
-    if (is_new) {
-      for (std::size_t row = 0; row < values.rows; ++row) {
-        text_ += "    ";
-        for (std::size_t j = 0; j < values.columns; ++j) {
-          if (j > 0) text_ += j % 8 == 0 ? ",\n    " : ", ";
-          text_ += python_number(values(row, j), bits_);
-        }
-        text_ += ",\n";
-      }
-      size_ += values.values.size();
-    }
-    return place->second;
-  }
-  [[nodiscard]] const std::string& text() const noexcept { return text_; }
-
- private:
-  int bits_;
-  std::size_t size_ = 0;
-  std::string text_;
-  std::map<std::string, std::size_t> known_;
-};
-
 class WarpWriter {
  public:
   explicit WarpWriter(const StepGraph& graph)
@@ -108,7 +71,8 @@ class WarpWriter {
     add_next_state();
     WarpModuleParts parts;
     parts.kernel = std::move(text_);
-    parts.helpers = helpers();
+    parts.has_functions_32 = has_functions_32_;
+    parts.has_functions_64 = has_functions_64_;
     parts.table_32 = table_32_.text();
     parts.table_64 = table_64_.text();
     parts.work_32 = work_32_;
@@ -472,11 +436,16 @@ class WarpWriter {
     const std::string x = column(node.operands[0], 0);
     const std::size_t at_knots = table(bits).add(knots);
     const std::size_t at_values = table(bits).add(values);
-    const std::string cell = fresh("j");
-    line(fmt::format("{} = {}", cell,
-                     called("cell", bits,
-                            {x, table_name, std::to_string(at_knots),
-                             std::to_string(knots.values.size() - 1)})));
+    const std::string search =
+        called("cell", bits,
+               {x, table_name, std::to_string(at_knots), std::to_string(knots.values.size() - 1)});
+    // Tables over the same knots have one search.
+    const auto [known, is_new] = cells_.try_emplace(search);
+    if (is_new) {
+      known->second = fresh("j");
+      line(fmt::format("{} = {}", known->second, search));
+    }
+    const std::string& cell = known->second;
     const std::string left = fresh("v");
     const std::string right = fresh("v");
     std::string share = fresh("v");
@@ -531,8 +500,6 @@ class WarpWriter {
     }
   }
 
-  [[nodiscard]] std::string helpers() const;
-
   const StepGraph& graph_;
   WarpTypes types_;
   std::vector<WarpRow> rows_;
@@ -541,69 +508,13 @@ class WarpWriter {
   WarpTable table_64_{64};
   std::map<std::pair<std::string, std::size_t>, std::string> bound_;
   std::map<WarpIndex, WarpRow> copies_;
+  std::map<std::string, std::string> cells_;  ///< variables, by their search
   std::size_t work_32_ = 0;
   std::size_t work_64_ = 0;
   std::size_t names_ = 0;
   bool has_functions_32_ = false;
   bool has_functions_64_ = false;
 };
-
-/// For numbers of {n} bits. A NaN of an operand is one of the result, which Warp's min and max do not promise; its sign of 0
-/// is 1.
-constexpr const char* kWarpHelpers = R"py(
-@wp.func
-def pick_{n}(condition: bool, yes: wp.float{n}, no: wp.float{n}):
-    if condition:
-        return yes
-    return no
-
-
-@wp.func
-def lower_{n}(a: wp.float{n}, b: wp.float{n}):
-    if a < b or a != a:
-        return a
-    return b
-
-
-@wp.func
-def higher_{n}(a: wp.float{n}, b: wp.float{n}):
-    if b < a or a != a:
-        return a
-    return b
-
-
-@wp.func
-def sign_{n}(a: wp.float{n}):
-    if a < wp.float{n}(0.0):
-        return wp.float{n}(-1.0)
-    if wp.float{n}(0.0) < a:
-        return wp.float{n}(1.0)
-    return a
-
-
-@wp.func
-def sigmoid_{n}(a: wp.float{n}):
-    return wp.float{n}(1.0) / (wp.float{n}(1.0) + wp.exp(-a))
-
-
-@wp.func
-def cell_{n}(x: wp.float{n}, table: wp.array(dtype=wp.float{n}), first: int, cells: int):
-    cell = int(0)
-    for k in range(1, cells):
-        knot = table[first + k]
-        if knot <= x:
-            cell = k
-    return cell
-
-)py";
-
-std::string WarpWriter::helpers() const {
-  std::string text;
-  for (const int bits : {32, 64})
-    if (bits == 64 ? has_functions_64_ : has_functions_32_)
-      text += fmt::format(kWarpHelpers, fmt::arg("n", bits));
-  return text;
-}
 
 }  // namespace
 

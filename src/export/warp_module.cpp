@@ -72,10 +72,10 @@ tests of torsio run this code with a substitute for the package.
 
     import {module}
     joints = {module}.make_state(4096, "cuda:0")
-    {module}.check_timestep(model.opt.timestep)        # one call is one tick of {period} s
-    {module}.step(inputs, joints)                      # inputs: wp.array2d of INPUTS in SI, one row for each joint
-    joints.value, joints.std_dev, joints.fault         # std_dev is NaN where there is no evidence; fault: index of FAULTS
-    {module}.reset(joints, is_done)                    # the joints whose number in is_done is not 0
+    {module}.check_timestep(model.opt.timestep)  # one call is one tick of {period} s
+    {module}.step(inputs, joints)  # inputs: wp.array2d of INPUTS in SI, one row for each joint
+    joints.value, joints.std_dev, joints.fault  # std_dev is NaN where there is no evidence; fault: index of FAULTS
+    {module}.reset(joints, is_done)  # the joints whose number in is_done is not 0
 
 Guards, fallback, error bar and faults are those of torsio's estimator, without its rule of jumps; a tick without inputs (NaN) is a
 long gap. From the channels in ZEROED the caller subtracts their zeros. Nothing is allocated in a step: it can be part of a CUDA
@@ -103,7 +103,9 @@ MuJoCo-Warp, one joint in each world, whose spring is between two hinges (their 
 
 import warp as wp
 
-RATE_HZ = {rate}
+wp.set_module_options({{"enable_backward": False}})
+
+RATE_HZ = float({rate})
 TARGET = "{target}"
 INPUTS = {inputs}
 ZEROED = {zeroed}
@@ -136,8 +138,8 @@ class Joints:
 
     def __init__(self, joints, device=None):
         self.joints = joints
-        self.device = device
         self.state = wp.zeros((joints, {allocated_width}), dtype=NUMBER, device=device)
+        self.device = self.state.device
         self.value = wp.zeros(joints, dtype=REAL, device=device)
         self.std_dev = wp.zeros(joints, dtype=REAL, device=device)
         self.fault = wp.zeros(joints, dtype=wp.int32, device=device)
@@ -177,6 +179,55 @@ def check_timestep(timestep_s):
         raise ValueError(f"timestep: expected {{1.0 / RATE_HZ:g}} s, the period of the model, found {{timestep_s:g}} s")
 )py";
 
+/// For numbers of {n} bits. A NaN of an operand is one of the result, which Warp's min and max do not promise; its sign of 0
+/// is 1.
+constexpr const char* kWarpHelpers = R"py(
+@wp.func
+def pick_{n}(condition: bool, yes: wp.float{n}, no: wp.float{n}):
+    if condition:
+        return yes
+    return no
+
+
+@wp.func
+def lower_{n}(a: wp.float{n}, b: wp.float{n}):
+    if a < b or a != a:
+        return a
+    return b
+
+
+@wp.func
+def higher_{n}(a: wp.float{n}, b: wp.float{n}):
+    if b < a or a != a:
+        return a
+    return b
+
+
+@wp.func
+def sign_{n}(a: wp.float{n}):
+    if a < wp.float{n}(0.0):
+        return wp.float{n}(-1.0)
+    if wp.float{n}(0.0) < a:
+        return wp.float{n}(1.0)
+    return a
+
+
+@wp.func
+def sigmoid_{n}(a: wp.float{n}):
+    return wp.float{n}(1.0) / (wp.float{n}(1.0) + wp.exp(-a))
+
+
+@wp.func
+def cell_{n}(x: wp.float{n}, table: wp.array(dtype=wp.float{n}), first: int, cells: int):
+    cell = int(0)
+    for k in range(1, cells):
+        knot = table[first + k]
+        if knot <= x:
+            cell = k
+    return cell
+
+)py";
+
 }  // namespace
 
 std::string warp_module(const StepGraph& graph, const WarpModuleParts& parts,
@@ -184,6 +235,9 @@ std::string warp_module(const StepGraph& graph, const WarpModuleParts& parts,
   check_warp_name(options.name);
   const char* state_type = parts.has_wide_state ? "float64" : "float32";
   const char* value_type = parts.has_wide_values ? "float64" : "float32";
+  std::string helpers;
+  if (parts.has_functions_32) helpers += fmt::format(kWarpHelpers, fmt::arg("n", 32));
+  if (parts.has_functions_64) helpers += fmt::format(kWarpHelpers, fmt::arg("n", 64));
   std::string tables;
   std::string arguments;
   std::string constants;
@@ -214,9 +268,8 @@ std::string warp_module(const StepGraph& graph, const WarpModuleParts& parts,
       fmt::arg("zeroed", python_names(graph.zeroed_channels)),
       fmt::arg("faults", python_fault_names()), fmt::arg("state_width", graph.state_width),
       fmt::arg("allocated_width", std::max<std::size_t>(graph.state_width, 1)),
-      fmt::arg("tables", tables), fmt::arg("helpers", parts.helpers),
-      fmt::arg("arguments", arguments), fmt::arg("kernel", parts.kernel),
-      fmt::arg("constants", constants));
+      fmt::arg("tables", tables), fmt::arg("helpers", helpers), fmt::arg("arguments", arguments),
+      fmt::arg("kernel", parts.kernel), fmt::arg("constants", constants));
 }
 
 }  // namespace torsio

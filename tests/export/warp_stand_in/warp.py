@@ -108,6 +108,11 @@ class _Kernel(_Function):
     pass
 
 
+def set_module_options(options):
+    if set(options) != {"enable_backward"}:
+        raise ValueError(options)
+
+
 def func(function):
     return _Function(function)
 
