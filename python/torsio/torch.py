@@ -64,6 +64,9 @@ _TYPES = {
 _LAYOUTS = ("estimator", "isaaclab")
 
 
+_Tick = Tuple[Tensor, Tensor, Tensor, Tensor]
+
+
 class Estimator(nn.Module):
     """A tick of an estimator for a batch of joints, as `torsio.Estimator.step` has it.
 
@@ -80,6 +83,7 @@ class Estimator(nn.Module):
         real, state = _TYPES[precision]
         self._types = {"real": real, "wide": state, "single": torch.float32, "truth": torch.bool}
         self.dtype = state
+        self.period_s = 1.0 / model.sample_rate_Hz
         self._nodes = graph["nodes"]
         self._outputs = [graph[name] for name in ("value", "std_dev", "fault", "next_state")]
         self.state_width = graph["state_width"]
@@ -93,12 +97,19 @@ class Estimator(nn.Module):
         # One column after the other in memory: each is read by itself.
         return torch.zeros(self.state_width, joints, dtype=self.dtype, device=device).t()
 
-    def forward(self, inputs: Tensor, state: Tensor) -> Tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Value, error bar (NaN: none), fault (int32, `torsio.Fault`), each (joints, 1), and the next state."""
+    def forward(self, inputs: Tensor, state: Tensor, timestep_s: Optional[float] = None) -> _Tick:
+        """Value, error bar (NaN: none), fault (int32, `torsio.Fault`), each (joints, 1), and the next state.
+
+        timestep_s: the time between two calls; another one than the period of a model that depends on time is `wrong_rate`.
+        """
+        period_s = self.period_s if timestep_s is None else timestep_s
+        return self._tick(inputs, state, torch.full((1, 1), period_s, dtype=state.dtype, device=state.device))
+
+    def _tick(self, inputs: Tensor, state: Tensor, timestep_s: Tensor) -> _Tick:
         # Columns are rows here: (quantities, joints), so that each is contiguous.
         rows: List[Tensor] = []
         for index, node in enumerate(self._nodes):
-            rows.append(self._computed(index, node, rows, inputs, state))
+            rows.append(timestep_s if node[0] == "timestep" else self._computed(index, node, rows, inputs, state))
         joints = inputs.shape[0]
 
         def full(index: int) -> Tensor:
@@ -186,10 +197,28 @@ def estimator(model: Model, *, precision: str = "mixed", guards: bool = True) ->
     return Estimator(model, precision=precision, guards=guards)
 
 
+class _Traced(nn.Module):
+    """A tick whose operations were recorded, with the interface of `Estimator`."""
+
+    def __init__(self, module: Estimator) -> None:
+        super().__init__()
+        self.period_s = module.period_s
+        self.state_width = module.state_width
+        inputs = torch.zeros(2, len(module.raw_inputs), dtype=module.dtype)
+        timestep_s = torch.full((1, 1), module.period_s, dtype=module.dtype)
+        example = {"_tick": (inputs, module.zero_state(2), timestep_s)}
+        self.tick = torch.jit.trace_module(module, example, check_trace=False)
+
+    def forward(self, inputs: Tensor, state: Tensor, timestep_s: Optional[float] = None) -> _Tick:
+        period_s = self.period_s
+        if timestep_s is not None:
+            period_s = timestep_s
+        return self.tick._tick(inputs, state, torch.full((1, 1), period_s, dtype=state.dtype, device=state.device))
+
+
 def script(module: Estimator) -> torch.jit.ScriptModule:
     """The module as TorchScript, for any number of joints."""
-    inputs = torch.zeros(2, len(module.raw_inputs), dtype=module.dtype)
-    return torch.jit.trace(module, (inputs, module.zero_state(2)), check_trace=False)
+    return torch.jit.script(_Traced(module))
 
 
 class ActuatorNet(nn.Module):

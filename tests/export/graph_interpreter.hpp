@@ -19,7 +19,8 @@ class GraphInterpreter {
   explicit GraphInterpreter(StepGraph graph)
       : graph_(std::move(graph)), rows_(graph_.nodes.size()), state_(graph_.state_width) {}
 
-  Estimate step(const std::vector<double>& raw) {
+  Estimate step(const std::vector<double>& raw, double timestep_s = 0.0) {
+    timestep_s_ = timestep_s > 0.0 ? timestep_s : 1.0 / graph_.sample_rate_Hz;
     for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i] = rounded(i, row_of(i, raw));
     state_ = rows_[graph_.next_state];
     return {.value = rows_[graph_.value].at(0),
@@ -62,6 +63,7 @@ class GraphInterpreter {
     switch (node.operation) {
       case Op::input: return raw;
       case Op::state: return state_;
+      case Op::timestep: return {timestep_s_};
       case Op::constant: return {node.values.row(0).begin(), node.values.row(0).end()};
       case Op::add: return by_column([&](std::size_t j) { return a(j) + b(j); });
       case Op::subtract: return by_column([&](std::size_t j) { return a(j) - b(j); });
@@ -145,6 +147,7 @@ class GraphInterpreter {
   StepGraph graph_;
   std::vector<Numbers> rows_;
   Numbers state_;
+  double timestep_s_ = 0.0;
 };
 
 }  // namespace torsio::test

@@ -124,6 +124,24 @@ TYPED_TEST(StepGraphs, HoldsTheLastValueWithoutInputsAndRecovers) {
   EXPECT_LT(worst, 1e-6 * range);
 }
 
+TYPED_TEST(StepGraphs, ReportAnotherRateThanTheirs) {
+  const ModelFile file = guarded(any_example<TypeParam>());
+  BasicEstimator<AnyModel> own(file.settings, AnyModel(file.parameters));
+  for (const std::string& channel : file.settings.zeroed_channels) own.set_zero(channel, 0.0);
+  GraphInterpreter graph(step_graph(file));
+  std::size_t tick = 0;
+  for (const std::vector<double>& raw : smooth_motion(600)) {
+    const bool is_wrong = tick > 300 && tick <= 340;
+    own.set_wrong_rate(is_wrong);
+    const Estimate expected = own.step(raw);
+    const Estimate found = graph.step(raw, is_wrong ? 2e-3 : 1e-3);
+    ASSERT_EQ(name(found.fault), name(expected.fault)) << tick;
+    ASSERT_NEAR(found.value, expected.value, 1e-5 * (1.0 + std::abs(expected.value))) << tick;
+    ASSERT_EQ(std::isnan(found.std_dev), std::isnan(expected.std_dev)) << tick;
+    ++tick;
+  }
+}
+
 TEST(StepGraphOptions, WithoutGuardsTheModelIsAlone) {
   const ModelFile file = guarded(any_example<GreyBox>());
   AnyModel own(file.parameters);

@@ -15,6 +15,7 @@ namespace torsio {
 enum class GraphOperation : std::uint8_t {
   input,     ///< the raw inputs
   state,     ///< the state
+  timestep,  ///< the time since the last tick in s, the same for all joints
   constant,  ///< `values`, one row; for `product` and `interpolation` more
   add,
   subtract,
@@ -63,7 +64,8 @@ enum class GraphPrecision : std::uint8_t {
 /// row for each. There are no branches and no loops: each guard selects.
 ///
 /// `input` (raw channels in SI, less their zeros) and `state` give `value`, `std_dev`, `fault` (as `Fault`) and `next_state`.
-/// The state after a reset is 0 everywhere.
+/// The state after a reset is 0 everywhere. Another `timestep` than the period of the model gives `Fault::wrong_rate`, unless
+/// the model does not depend on time.
 ///
 /// The guards are those of the estimator, with two differences (docs/robot/simulators.md): there is no rule of jumps, and a
 /// tick without inputs is always a long gap, after which filters and model start again.

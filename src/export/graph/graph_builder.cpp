@@ -54,6 +54,7 @@ std::string_view name(GraphOperation operation) noexcept {
   switch (operation) {
     case GraphOperation::input: return "input";
     case GraphOperation::state: return "state";
+    case GraphOperation::timestep: return "timestep";
     case GraphOperation::constant: return "constant";
     case GraphOperation::add: return "add";
     case GraphOperation::subtract: return "subtract";
@@ -142,6 +143,8 @@ Row GraphBuilder::input(std::size_t width) {
   graph_.nodes[0].width = width;
   return {this, 0};
 }
+
+Row GraphBuilder::timestep() { return node(GraphOperation::timestep, state_type(), 1, {}); }
 
 Row GraphBuilder::constant(Matrix values, GraphType type) {
   GraphNode node{

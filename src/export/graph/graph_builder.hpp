@@ -34,6 +34,7 @@ class GraphBuilder {
   void use_wide(bool is_wide) noexcept { is_wide_ = is_wide; }
 
   Row input(std::size_t width);
+  Row timestep();
   Row constant(double value);
   Row constant(std::span<const double> values);
   Row constant(Matrix values);

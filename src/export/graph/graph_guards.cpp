@@ -116,6 +116,7 @@ GraphEstimate guarded(GraphBuilder& graph, const GraphGuards& guards, const Grap
   fault = select(0.5 < raw.fault, raw.fault, fault);
   fault = select(tick.is_settled, fault, fault_number(Fault::warming_up));
   fault = select(1.0 < e.fallback, fault_number(Fault::outside_training_range), fault);
+  fault = select(tick.is_wrong_rate, fault_number(Fault::wrong_rate), fault);
   const Row is_used = fault < 0.5;
 
   const Row w = limited(e.fallback, 0.0, 1.0);
@@ -139,7 +140,8 @@ GraphEstimate guarded(GraphBuilder& graph, const GraphGuards& guards, const Grap
                              widened_std_dev);
   GraphEstimate out;
   out.value = select(is_used, value, other);
-  out.std_dev = select(is_used, widened_std_dev, select(e.is_outside, kNotMeasured, of_fallback));
+  out.std_dev = select(is_used, widened_std_dev,
+                       select(either(e.is_outside, tick.is_wrong_rate), kNotMeasured, of_fallback));
   out.fault =
       select(both(is_used, e.is_outside), fault_number(Fault::outside_training_range), fault);
   return out;

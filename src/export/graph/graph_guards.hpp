@@ -33,6 +33,7 @@ struct GraphTick {
   const GraphFeatures& features;
   const GraphExcursion& excursion;
   Row is_settled = {};
+  Row is_wrong_rate = {};   ///< a truth
   Row memory_is_open = {};  ///< a truth
   Row memory_bound = {};
   Row last_value = {};

@@ -73,8 +73,9 @@ class GuardedStep {
                                                either(poisoned, 0.5 < missed), is_not(is_measured));
     const Row is_usable_tick = both(is_measured, all_finite(features.all));
     GraphExcursion excursion = add_excursion(graph_, guards_, features.all);
-    const Row in_jump =
-        list.assumes_jumps ? both(is_usable_tick, excursion.is_outside) : graph_.truth(false);
+    const Row is_wrong_rate = list.depends_on_rate ? wrong_rate() : never;
+    const Row leaves = list.assumes_jumps ? excursion.is_outside : never;
+    const Row in_jump = both(is_usable_tick, either(is_wrong_rate, leaves));
     const Row is_accepted = both(is_usable_tick, is_not(in_jump));
     const Row resumes = both(both(is_accepted, 0.5 < missed), has_run);
 
@@ -99,12 +100,13 @@ class GuardedStep {
       memory_is_open = memory->is_open();
       bound = memory->bound();
     }
-    if (list.assumes_jumps) excursion.fallback = select(in_jump, kBoundless, excursion.fallback);
+    excursion.fallback = select(in_jump, kBoundless, excursion.fallback);
     const Row is_settled = both(features.is_settled, is_finite(features.start_std_dev));
     const GraphEstimate out = guarded(graph_, guards_,
                                       {.features = features,
                                        .excursion = excursion,
                                        .is_settled = is_settled,
+                                       .is_wrong_rate = is_wrong_rate,
                                        .memory_is_open = memory_is_open,
                                        .memory_bound = bound,
                                        .last_value = last_value},
@@ -122,6 +124,13 @@ class GuardedStep {
 
  private:
   static constexpr double kBoundless = 1e30;
+
+  /// Whether the ticks do not come at the sample rate.
+  Row wrong_rate() {
+    constexpr double kRounding = 1e-3;
+    const Row ticks = graph_.timestep() * guards_.settings.sample_rate_Hz;
+    return kRounding < absolute(ticks - 1.0);
+  }
 
   /// What the memory has received, or not, of the inputs of this tick and of those before it.
   void follow(GraphMemory& memory, const GraphFeatures& features, const GraphExcursion& excursion,

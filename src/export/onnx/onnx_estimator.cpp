@@ -109,6 +109,7 @@ class EstimatorWriter {
     switch (node.operation) {
       case GraphOperation::input: return "inputs";
       case GraphOperation::state: return "state";
+      case GraphOperation::timestep: return timestep();
       case GraphOperation::constant: return constant(node.values, node.type);
       case GraphOperation::sum: {
         OnnxGraph::Names inputs{operands[0], onnx_.whole({1})};
@@ -150,6 +151,15 @@ class EstimatorWriter {
       case GraphOperation::held_interpolation: return interpolated(node, operands[0]);
       default: return onnx_.add(operator_of(node.operation), operands);
     }
+  }
+
+  /// An input with a value, which a program may leave out.
+  std::string timestep() {
+    const std::string name = "timestep_s";
+    const std::vector<double> period{1.0 / graph_.sample_rate_Hz};
+    onnx_.input(name, wide_, {1, 1});
+    onnx_.initial_value(name, period, wide_ == OnnxType::FLOAT, {1, 1});
+    return name;
   }
 
   std::string cast(const std::string& name, int type) {
