@@ -240,6 +240,7 @@ class WarpWriter {
     switch (node.operation) {
       case WarpOperation::input: return {.array = "inputs"};
       case WarpOperation::state: return {.array = "state"};
+      case WarpOperation::timestep: return {.columns = {"timestep_s"}};
       case WarpOperation::part: return part_of(node);
       case WarpOperation::joined: return joined_of(node);
       case WarpOperation::sum:

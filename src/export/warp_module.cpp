@@ -118,6 +118,7 @@ REAL = wp.{value_type}  # of value and error bar
 @wp.kernel(enable_backward=False)
 def tick(
     inputs: wp.array2d(dtype=wp.{state_type}),
+    timestep_s: wp.{state_type},
 {arguments}    state: wp.array2d(dtype=wp.{state_type}),
     value: wp.array(dtype=wp.{value_type}),
     std_dev: wp.array(dtype=wp.{value_type}),
@@ -152,14 +153,17 @@ def make_state(joints, device=None):
     return Joints(joints, device)
 
 
-def step(inputs, joints):
-    """One tick of all joints: from inputs (joints, len(INPUTS)) of NUMBER to joints.value, joints.std_dev and joints.fault."""
+def step(inputs, joints, timestep_s=1.0 / RATE_HZ):
+    """One tick of all joints: from inputs (joints, len(INPUTS)) of NUMBER to joints.value, joints.std_dev and joints.fault.
+
+    Another time since the last tick than the period of the model is the fault wrong_rate, if the model depends on time.
+    """
     if inputs.dtype != NUMBER or tuple(inputs.shape) != (joints.joints, len(INPUTS)):
         raise ValueError(f"inputs: expected {{(joints.joints, len(INPUTS))}} of {{NUMBER}}, found {{inputs.shape}} of {{inputs.dtype}}")
     wp.launch(
         tick,
         dim=joints.joints,
-        inputs=[inputs, *joints._constant],
+        inputs=[inputs, timestep_s, *joints._constant],
         outputs=[joints.state, joints.value, joints.std_dev, joints.fault],
         device=joints.device,
     )

@@ -206,6 +206,8 @@ assert joints.value.numpy()[1] == alone.value.numpy()[1] != joints.value.numpy()
 assert joints.fault.numpy()[0] != joints.fault.numpy()[1] and m.FAULTS[joints.fault.numpy()[1]] == "warming_up"
 m.reset(joints)
 assert (joints.state.numpy() == 0).all()
+m.step(inputs, joints, timestep_s=0.002)
+assert m.FAULTS[joints.fault.numpy()[0]] == "wrong_rate" and np.isfinite(joints.value.numpy()).all()
 m.check_timestep(1.0 / m.RATE_HZ)
 assert "0.001 s" in raises(ValueError, lambda: m.check_timestep(0.002))
 raises(ValueError, lambda: m.check_timestep(float("nan")))

@@ -124,8 +124,11 @@ def kernel(function=None, *, enable_backward=True):
 def launch(kernel, dim, inputs=(), outputs=(), device=None):
     global _thread
     arguments = [*inputs, *outputs]
-    if [argument.type for argument in arguments] != kernel.arguments:
-        raise TypeError(f"{kernel.name}: expected {kernel.arguments}, found {[a.type for a in arguments]}")
+    kinds = [given.type if isinstance(given, array) else kind for given, kind in zip(arguments, kernel.arguments)]
+    if len(arguments) != len(kernel.arguments) or kinds != kernel.arguments:
+        raise TypeError(f"{kernel.name}: expected {kernel.arguments}, found {kinds}")
+    # Numbers are converted to the type of the argument.
+    arguments = [given if isinstance(given, array) else globals()[kind](given) for given, kind in zip(arguments, kinds)]
     for place in np.ndindex(dim):
         _thread = place if len(place) > 1 else place[0]
         kernel.run(*arguments)
