@@ -32,7 +32,6 @@ FAMILIES = {
 BOUNDS = {"double": (1e-6, 1e-6), "mixed": (1e-5, 1e-5), "float": (1e-4, 1e-5)}
 OTHER_BOUNDS = {
     ("parametric_gp", "float"): (2e-4, 5e-2),
-    ("hammerstein_wiener", "mixed"): (5e-2, 1e-5),
     ("hammerstein_wiener", "float"): (5e-2, 1e-5),
 }
 TICKS = 400

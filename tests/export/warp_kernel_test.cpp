@@ -152,16 +152,21 @@ class WarpKernels : public testing::Test {
 };
 TYPED_TEST_SUITE(WarpKernels, Exported, ExportedName);
 
+/// Some families, since each program takes most of a second.
+template <class Family>
+class WarpPrecisions : public WarpKernels<Family> {};
+using SomeExported = testing::Types<Scheduled, GreyBoxWithBanks, Gru, HammersteinWiener>;
+TYPED_TEST_SUITE(WarpPrecisions, SomeExported, ExportedName);
+
 TYPED_TEST(WarpKernels, InDoubleAreTheEstimator) {
-  expect_kernel_is_estimator(guarded(any_example<TypeParam>()), GraphPrecision::twofold, 1e-6,
-                             1200);
+  expect_kernel_is_estimator(guarded(any_example<TypeParam>()), GraphPrecision::twofold, 1e-6, 700);
 }
 
 TYPED_TEST(WarpKernels, WithWideFeaturesAreNearlyTheEstimator) {
   expect_kernel_is_estimator(guarded(any_example<TypeParam>()), GraphPrecision::mixed, 1e-5, 700);
 }
 
-TYPED_TEST(WarpKernels, InFloatAreNearlyTheEstimator) {
+TYPED_TEST(WarpPrecisions, InFloatAreNearlyTheEstimator) {
   expect_kernel_is_estimator(guarded(any_example<TypeParam>()), GraphPrecision::single, 1e-4, 700);
 }
 
@@ -170,7 +175,7 @@ TYPED_TEST(WarpKernels, HaveTheWholeLanguageOfTheirFeatures) {
                              500);
 }
 
-TYPED_TEST(WarpKernels, HaveItAlsoWithWideFeatures) {
+TYPED_TEST(WarpPrecisions, HaveTheWholeLanguageAlsoWithWideFeatures) {
   expect_kernel_is_estimator(remembering(any_example<TypeParam>()), GraphPrecision::mixed, 1e-4,
                              300);
 }

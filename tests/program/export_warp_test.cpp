@@ -33,7 +33,7 @@ TEST_F(ExportWarp, WritesAModule) {
   const std::string before = contents("joint_warp.py");
   EXPECT_EQ(json.at("bytes"), before.size());
   EXPECT_NE(before.find("import joint_warp\n"), std::string::npos);
-  EXPECT_NE(before.find("RATE_HZ = 1000"), std::string::npos);
+  EXPECT_NE(before.find("RATE_HZ = float(1000"), std::string::npos);
   EXPECT_EQ(torsio(call).exit_code, kCallWasWrong);
   EXPECT_EQ(torsio(call + " --real float").exit_code, kCallWasWrong);
   EXPECT_EQ(contents("joint_warp.py"), before);

@@ -22,12 +22,6 @@
 
 namespace {
 
-torsio::CReal real_of(const std::string& text) {
-  if (text.empty() || text == "float") return torsio::CReal::single;
-  if (text == "double") return torsio::CReal::twofold;
-  throw torsio::UsageError({.place = "--real", .expected = "float or double", .found = text});
-}
-
 /// "gear_angle_rad=524288"
 torsio::CCounts counts_of(const std::string& text) {
   const auto equals = text.find('=');
@@ -177,7 +171,7 @@ void export_c99(ExportFlags& flags) {
   const std::filesystem::path folder(flags.output);
   const std::string header = (folder / (flags.c99 + ".h")).string();
   const std::string source = (folder / (flags.c99 + ".c")).string();
-  const torsio::CReal real = real_of(flags.real);
+  const torsio::CReal real = real_of(flags, torsio::CReal::single);
   torsio::C99Options options{.name = flags.c99, .real = real};
   for (const std::string& each : flags.counts) options.counts.push_back(counts_of(each));
   if (!flags.controller.empty()) options.controller = torsio::read_controller(flags.controller);
@@ -214,15 +208,13 @@ void export_c99(ExportFlags& flags) {
         "{} and {} written: {}, {}, {} Hz\n{}", header, source, model.parameters.family(),
         real == torsio::CReal::single ? "float" : "double", model.settings.sample_rate_Hz,
         cost_table(flags.c99, program, real, model.settings.sample_rate_Hz, targets)));
-  nlohmann::json document{{"format", "torsio.export"},
-                          {"version", 1},
-                          {"family", std::string(model.parameters.family())},
-                          {"real", real == torsio::CReal::single ? "float" : "double"},
-                          {"header", header},
-                          {"source", source},
-                          {"table_bytes", program.table_bytes},
-                          {"state_bytes", program.state_bytes},
-                          {"parts", parts_json(program)},
-                          {"targets", cost_json(program, real, targets)}};
+  nlohmann::json document = export_document(model);
+  document["real"] = real == torsio::CReal::single ? "float" : "double";
+  document["header"] = header;
+  document["source"] = source;
+  document["table_bytes"] = program.table_bytes;
+  document["state_bytes"] = program.state_bytes;
+  document["parts"] = parts_json(program);
+  document["targets"] = cost_json(program, real, targets);
   flags.json.write(document.dump(2) + "\n");
 }

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "common/output.hpp"
+#include "torsio/export/c99.hpp"
+#include "torsio/export/step_graph.hpp"
+#include "torsio/files/model_file.hpp"
 
 /// The flags of `torsio export`. One of the targets is named: c99, onnx, torchscript, mjcf, fmi or warp.
 struct ExportFlags {
@@ -32,6 +36,14 @@ struct ExportFlags {
 
 /// @throws UsageError if the file exists and is not to be replaced; Error if it cannot be written
 void require_new(const ExportFlags& flags, const std::string& file);
+
+/// The type of --real. @throws UsageError for another than float and double
+torsio::CReal real_of(const ExportFlags& flags, torsio::CReal otherwise);
+/// The same with `mixed`.
+torsio::GraphPrecision precision_of(const ExportFlags& flags, torsio::GraphPrecision otherwise);
+
+/// What the document of each target begins with.
+nlohmann::json export_document(const torsio::ModelFile& model);
 
 void export_c99(ExportFlags& flags);
 void export_fmu(ExportFlags& flags);

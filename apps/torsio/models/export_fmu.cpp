@@ -18,24 +18,6 @@ torsio::FmiVersion fmi_version_of(const std::string& text) {
   throw torsio::UsageError({.place = "--fmi", .expected = "2 or 3", .found = text});
 }
 
-torsio::CReal real_of_fmu(const std::string& text) {
-  if (text.empty() || text == "double") return torsio::CReal::twofold;
-  if (text == "float") return torsio::CReal::single;
-  throw torsio::UsageError({.place = "--real", .expected = "float or double", .found = text});
-}
-
-/// Flags of a program for a drive.
-void refuse_flags_of_drive(const ExportFlags& flags) {
-  if (flags.counts.empty() && flags.controller.empty() && flags.target.empty() &&
-      flags.flash.empty() && flags.ram.empty() && flags.clock.empty() && flags.layout.empty())
-    return;
-  throw torsio::UsageError(
-      {.place = "--fmi",
-       .problem = "--counts, --controller, --target, --flash, --ram, --clock and --layout are not "
-                  "those of an FMU",
-       .advice = "Remove them."});
-}
-
 /// $CC or cc.
 std::string c_compiler() {
   const char* const named = std::getenv("CC");  // NOLINT(concurrency-mt-unsafe): one thread
@@ -45,11 +27,10 @@ std::string c_compiler() {
 }  // namespace
 
 void export_fmu(ExportFlags& flags) {
-  refuse_flags_of_drive(flags);
   require_ending("-o", flags.output, {".fmu"});
   const torsio::FmuOptions options{.name = std::filesystem::path(flags.output).stem().string(),
                                    .version = fmi_version_of(flags.fmi),
-                                   .real = real_of_fmu(flags.real)};
+                                   .real = real_of(flags, torsio::CReal::twofold)};
   const torsio::ModelFile model = torsio::load_model(flags.model);
   torsio::Fmu fmu =
       torsio::make_fmu(model, options, std::filesystem::path(flags.model).filename().string());
@@ -64,15 +45,13 @@ void export_fmu(ExportFlags& flags) {
                       1.0 / model.settings.sample_rate_Hz, bytes,
                       fmu.platform.empty() ? std::string("sources only (--compile adds a library)")
                                            : fmt::format("library for {}", fmu.platform)));
-  nlohmann::json document{{"format", "torsio.export"},
-                          {"version", 1},
-                          {"family", std::string(model.parameters.family())},
-                          {"real", real},
-                          {"fmi", flags.fmi == "2" ? 2 : 3},
-                          {"file", flags.output},
-                          {"bytes", bytes},
-                          {"token", fmu.token},
-                          {"platform", nullptr}};
+  nlohmann::json document = export_document(model);
+  document["real"] = real;
+  document["fmi"] = flags.fmi == "2" ? 2 : 3;
+  document["file"] = flags.output;
+  document["bytes"] = bytes;
+  document["token"] = fmu.token;
+  document["platform"] = nullptr;
   if (!fmu.platform.empty()) document["platform"] = fmu.platform;
   for (const torsio::FmuFile& file : fmu.files) document["files"].push_back(file.path);
   flags.json.write(document.dump(2) + "\n");

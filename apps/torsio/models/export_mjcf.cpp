@@ -10,28 +10,7 @@
 #include "torsio/files/model_file.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
 
-namespace {
-
-/// Flags that belong to another target.
-void require_no_flags_of_c(const ExportFlags& flags) {
-  const auto refuse = [](const char* flag, bool is_given) {
-    if (is_given)
-      throw torsio::UsageError(
-          {.place = flag, .problem = "it belongs to --c99", .advice = "Remove it, or --mjcf."});
-  };
-  refuse("--real", !flags.real.empty());
-  refuse("--counts", !flags.counts.empty());
-  refuse("--controller", !flags.controller.empty());
-  refuse("--target", !flags.target.empty());
-  refuse("--flash", !flags.flash.empty());
-  refuse("--ram", !flags.ram.empty());
-  refuse("--clock", !flags.clock.empty());
-}
-
-}  // namespace
-
 void export_mjcf(ExportFlags& flags) {
-  require_no_flags_of_c(flags);
   require_ending("-o", flags.output, {".xml"});
   const std::filesystem::path file(flags.output);
   const torsio::MjcfOptions options{
@@ -48,11 +27,9 @@ void export_mjcf(ExportFlags& flags) {
                       model.parameters.family(), model.settings.sample_rate_Hz,
                       torsio::full_name(options.actuator),
                       options.is_linear ? "linear fallback" : "the model, by torsio::mujoco"));
-  const nlohmann::json document{{"format", "torsio.export"},
-                                {"version", 1},
-                                {"family", std::string(model.parameters.family())},
-                                {"mjcf", flags.output},
-                                {"actuator", torsio::full_name(options.actuator)},
-                                {"spring", options.is_linear ? "linear" : "model"}};
+  nlohmann::json document = export_document(model);
+  document["mjcf"] = flags.output;
+  document["actuator"] = torsio::full_name(options.actuator);
+  document["spring"] = options.is_linear ? "linear" : "model";
   flags.json.write(document.dump(2) + "\n");
 }

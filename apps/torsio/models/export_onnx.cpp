@@ -15,18 +15,6 @@
 
 namespace {
 
-/// --counts and others belong to the C program.
-void refuse_flags_of_c(const ExportFlags& flags, const char* target) {
-  if (flags.counts.empty() && flags.controller.empty() && flags.target.empty() &&
-      flags.flash.empty() && flags.ram.empty() && flags.clock.empty())
-    return;
-  throw torsio::UsageError(
-      {.place = target,
-       .problem =
-           "--counts, --controller, --target, --flash, --ram and --clock are those of a C program",
-       .advice = "Remove them, or take --c99."});
-}
-
 #ifdef TORSIO_HAS_ONNX
 torsio::OnnxLayout layout_of(const std::string& text) {
   if (text.empty() || text == "estimator") return torsio::OnnxLayout::estimator;
@@ -41,16 +29,12 @@ torsio::OnnxLayout layout_of(const std::string& text) {
       {.place = "--layout", .expected = "estimator, network, newton or isaaclab", .found = text});
 }
 
-torsio::GraphPrecision precision_of(const ExportFlags& flags, torsio::OnnxLayout layout) {
+torsio::GraphPrecision precision_of_graph(const ExportFlags& flags, torsio::OnnxLayout layout) {
   if (layout != torsio::OnnxLayout::estimator && !flags.real.empty() && flags.real != "float")
     throw torsio::UsageError({.place = "--real " + flags.real,
                               .problem = "a network alone computes in float, as the model does",
                               .advice = "Remove it, or take --layout estimator."});
-  if (flags.real.empty() || flags.real == "double") return torsio::GraphPrecision::twofold;
-  if (flags.real == "mixed") return torsio::GraphPrecision::mixed;
-  if (flags.real == "float") return torsio::GraphPrecision::single;
-  throw torsio::UsageError(
-      {.place = "--real", .expected = "float, mixed or double", .found = flags.real});
+  return precision_of(flags, torsio::GraphPrecision::twofold);
 }
 
 /// What a program has to know that steps the graph.
@@ -73,10 +57,10 @@ void add_graph(nlohmann::json& document, const torsio::ModelFile& model,
 }  // namespace
 
 void export_onnx([[maybe_unused]] ExportFlags& flags) {
-  refuse_flags_of_c(flags, "--onnx");
 #ifdef TORSIO_HAS_ONNX
+  require_ending("-o", flags.output, {".onnx"});
   const torsio::OnnxLayout layout = layout_of(flags.layout);
-  const torsio::GraphPrecision precision = precision_of(flags, layout);
+  const torsio::GraphPrecision precision = precision_of_graph(flags, layout);
   const torsio::ModelFile model = torsio::load_model(flags.model);
   const std::string bytes =
       torsio::onnx_bytes(model, {.layout = layout,
@@ -88,12 +72,10 @@ void export_onnx([[maybe_unused]] ExportFlags& flags) {
     print(fmt::format("{} written: {}, {}, {} B, one tick at {:g} Hz\n", flags.output,
                       model.parameters.family(), flags.layout.empty() ? "estimator" : flags.layout,
                       bytes.size(), model.settings.sample_rate_Hz));
-  nlohmann::json document{{"format", "torsio.export"},
-                          {"version", 1},
-                          {"family", std::string(model.parameters.family())},
-                          {"file", flags.output},
-                          {"layout", flags.layout.empty() ? "estimator" : flags.layout},
-                          {"bytes", bytes.size()}};
+  nlohmann::json document = export_document(model);
+  document["file"] = flags.output;
+  document["layout"] = flags.layout.empty() ? "estimator" : flags.layout;
+  document["bytes"] = bytes.size();
   if (layout == torsio::OnnxLayout::estimator) add_graph(document, model, precision);
   flags.json.write(document.dump(2) + "\n");
 #else
@@ -104,10 +86,13 @@ void export_onnx([[maybe_unused]] ExportFlags& flags) {
 }
 
 void export_torchscript(ExportFlags& flags) {
+  std::string options;
+  if (!flags.layout.empty()) options += " --layout " + flags.layout;
+  if (!flags.real.empty()) options += " --real " + flags.real;
   throw torsio::UsageError(
       {.place = "--torchscript",
        .problem = "TorchScript is written by PyTorch",
        .advice = fmt::format(
-           "With the Python module and PyTorch installed: python3 -m torsio.torch {} -o {}",
-           flags.model, flags.output)});
+           "With the Python module and PyTorch installed: python3 -m torsio.torch {}{} -o {}",
+           flags.model, options, flags.output)});
 }

@@ -203,6 +203,9 @@ void GraphBuilder::finish(const Scope& scope, Row keeps, Row clears) {
   std::vector<Row> next;
   for (std::size_t i = scope.first_part; i < scope.end_part; ++i)
     next.push_back({this, next_.at(graph_.state[i].name)});
+  const auto is_real = [this](Row row) { return at(row.index).type == GraphType::real; };
+  if (!std::ranges::all_of(next, is_real))
+    for (Row& row : next) row = as_type(row, state_type());
   const Row own = as_type(joined(next), state_type());
   const Row before{this, scope.before};
   const Row kept = clears.is_constant() ? before : before * as_type(keeps, state_type());
@@ -213,7 +216,8 @@ Row GraphBuilder::state(const std::string& name, std::size_t width) {
   const std::size_t first = graph_.state_width;
   graph_.state.push_back({name, first, width});
   graph_.state_width += width;
-  return node(GraphOperation::part, number_type(), width, {scope_.read}, first - scope_.first);
+  const GraphIndex read = number_type() == state_type() ? scope_.cleared : scope_.read;
+  return node(GraphOperation::part, number_type(), width, {read}, first - scope_.first);
 }
 
 Row GraphBuilder::truth_state(const std::string& name) { return 0.5 < state(name); }

@@ -147,7 +147,11 @@ Row curve_row(GraphBuilder& graph, const StaticCurve& curve, Row x) {
   return interpolated(x, curve.knots, graph.constant(std::move(table)), false);
 }
 
-GraphEstimate added_model(GraphBuilder& graph, const HammersteinWiener::Parameters& p, Row x) {
+// In wide numbers: the sections add up small differences.
+GraphEstimate added_model(GraphBuilder& graph, const HammersteinWiener::Parameters& p,
+                          Row features) {
+  graph.use_wide(true);
+  const Row x = graph.as_number(features);
   // The states are those less the ones at rest, so that zero is the state after a reset.
   const double rest_in = p.input(p.rest_input);
   double rest_out = rest_in;
@@ -181,7 +185,10 @@ GraphEstimate added_model(GraphBuilder& graph, const HammersteinWiener::Paramete
   estimate.fault =
       select(is_usable, select(is_inside, 0.0, fault_number(Fault::outside_training_range)),
              fault_number(Fault::model_not_finite));
-  return estimate;
+  graph.use_wide(false);
+  return {.value = to_real(estimate.value),
+          .std_dev = to_real(estimate.std_dev),
+          .fault = to_real(estimate.fault)};
 }
 
 }  // namespace
