@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <map>
@@ -170,12 +171,12 @@ class WarpWriter {
 
   /// The row in an array, where loops reach it.
   WarpRow in_array(WarpIndex index) {
-    const WarpRow own = row(index);
+    WarpRow own = row(index);
     if (own.is_in_array()) return own;
     const auto [known, is_new] = copies_.try_emplace(index);
     if (!is_new) return known->second;
     const std::vector<std::string> columns = all_columns(index);
-    const WarpRow copy = room(bits_of(index), columns.size());
+    WarpRow copy = room(bits_of(index), columns.size());
     for (std::size_t j = 0; j < columns.size(); ++j)
       line(fmt::format("{} = {}", element(copy.array, std::to_string(copy.first + j)), columns[j]));
     known->second = copy;
@@ -278,7 +279,7 @@ class WarpWriter {
       arrays.push_back(is_wide ? std::optional(in_array(operand)) : std::nullopt);
       of.push_back(is_wide ? fresh("v") : column(operand, 0));
     }
-    const WarpRow result = room(types_.bits(node.type), node.width);
+    WarpRow result = room(types_.bits(node.type), node.width);
     const std::string j = fresh("j");
     line(fmt::format("for {} in range({}):", j, node.width));
     for (std::size_t k = 0; k < of.size(); ++k)
@@ -318,9 +319,8 @@ class WarpWriter {
   }
 
   [[nodiscard]] bool has_wide_operand(const WarpNode& node) const {
-    for (const WarpIndex operand : node.operands)
-      if (width_of(operand) > kUnrolledWidth) return true;
-    return false;
+    return std::ranges::any_of(
+        node.operands, [this](WarpIndex operand) { return width_of(operand) > kUnrolledWidth; });
   }
 
   /// Writes the row to the array, from this place on.
@@ -380,7 +380,7 @@ class WarpWriter {
     const std::string table_name = fmt::format("table_{}", bits);
     if (matrix.columns == 1)
       return {.columns = {dot_product(own, table_name, place, matrix, {}, 1)}};
-    const WarpRow result = room(bits, matrix.columns);
+    WarpRow result = room(bits, matrix.columns);
     const std::string j = fresh("j");
     line(fmt::format("for {} in range({}):", j, matrix.columns));
     const std::string value = dot_product(own, table_name, place, matrix, j, 2);
@@ -392,7 +392,7 @@ class WarpWriter {
   /// code, which Warp does not change in a loop.
   std::string dot_product(const WarpRow& row, const std::string& table_name, std::size_t place,
                           const Matrix& matrix, const std::string& j, int depth) {
-    const std::string value = fresh("v");
+    std::string value = fresh("v");
     const std::string left = fresh("v");
     const std::string right = fresh("v");
     const std::string k = fresh("j");

@@ -89,9 +89,9 @@ class Failures(list):
 def prepare(torsio, folder, data):
     """Model files, and for each the estimates of a recording that it was not fitted to. @returns (case, model, estimates)"""
     simulated = []
-    for seed in (1, 2):
+    for seed, duration in ((1, '40s'), (2, '20s')):
         simulated.append(folder / f'sweep_{seed}.csv')
-        run(torsio, 'simulate', 'dfki-50', 'sweep', '--duration', '20s', '--seed', seed, '-o', simulated[-1])
+        run(torsio, 'simulate', 'dfki-50', 'sweep', '--duration', duration, '--seed', seed, '-o', simulated[-1])
     prepared = []
     for case in CASES:
         model = folder / f"{case.name.replace(' ', '_')}.safetensors"

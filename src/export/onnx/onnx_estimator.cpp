@@ -155,7 +155,7 @@ class EstimatorWriter {
 
   /// An input with a value, which a program may leave out.
   std::string timestep() {
-    const std::string name = "timestep_s";
+    std::string name = "timestep_s";
     const std::vector<double> period{1.0 / graph_.sample_rate_Hz};
     onnx_.input(name, wide_, {1, 1});
     onnx_.initial_value(name, period, wide_ == OnnxType::FLOAT, {1, 1});
