@@ -31,11 +31,14 @@ namespace {
 
 void check_name(const std::string& name) {
   static constexpr std::array kReserved{
-      "auto",     "break",  "case",   "char",      "const",    "continue", "default",  "do",
-      "double",   "else",   "enum",   "extern",    "float",    "for",      "goto",     "if",
-      "inline",   "int",    "long",   "register",  "restrict", "return",   "short",    "signed",
-      "sizeof",   "static", "struct", "switch",    "typedef",  "union",    "unsigned", "void",
-      "volatile", "while",  "class",  "namespace", "template", "this",     "new",      "delete"};
+      "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else",
+      "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long", "register",
+      "restrict", "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef",
+      "union", "unsigned", "void", "volatile", "while", "class", "namespace", "template", "this",
+      "new", "delete",
+      // NAME.h would hide them.
+      "assert", "ctype", "errno", "limits", "math", "stdbool", "stddef", "stdint", "stdio",
+      "stdlib", "string", "time"};
   const auto is_part = [](unsigned char letter) {
     return std::isalnum(letter) != 0 || letter == '_';
   };
@@ -46,7 +49,7 @@ void check_name(const std::string& name) {
     throw UsageError(
         {.place = "the name of the program",
          .expected = "a C identifier of at most 48 letters, digits and _ that begins with a letter "
-                     "and is not a keyword",
+                     "and is neither a keyword nor the name of a standard header",
          .found = '"' + name + '"'});
 }
 
@@ -111,6 +114,26 @@ std::string arguments_text(const std::vector<CInput>& inputs) {
                                              counts, kCountParts)
                                : fmt::format("  raw.{0} = {0};\n", input.channel);
   }
+  return text;
+}
+
+/// How to give inputs, and what was not measured.
+std::string inputs_text(const std::vector<CInput>& inputs, const C99Options& options) {
+  std::string text;
+  bool has_number = false;
+  for (const CInput& input : inputs) {
+    const auto counts = std::ranges::find(options.counts, input.channel, &CCounts::channel);
+    if (counts == options.counts.end()) {
+      has_number = true;
+      continue;
+    }
+    text += fmt::format("\n   {}: its encoder has {:g} counts in a turn{}.", input.channel,
+                        std::abs(counts->counts_per_turn),
+                        counts->counts_per_turn < 0.0 ? ", which rise where the angle falls" : "");
+  }
+  if (has_number) text.insert(0, " NaN for an input that was not measured.");
+  if (!options.counts.empty())
+    text += "\n   A tick in which counts were not measured is reported by @miss instead.";
   return text;
 }
 
@@ -285,7 +308,7 @@ $ZEROS$/* So many ticks did not take place: for the next step they are a gap. */
 void @miss(@state *state, uint32_t ticks);
 /* From now on the ticks do not come at $RATE$ Hz (1), or do again (0). */
 void @set_wrong_rate(@state *state, int is_wrong);
-/* One tick, $RATE$ of them per second. NaN for an input that was not measured. */
+/* One tick, $RATE$ of them per second.$NOT_MEASURED$ */
 @estimate @step(@state *state$PARAMETERS$);
 $CONTROLLER$
 #ifdef $GUARD$_SELF_TEST
@@ -311,13 +334,14 @@ $CONTROLLER$
                 {"CONTROLLER", options.controller ? controller_header(options) : ""},
                 {"ZEROS", zeros_header(inputs)},
                 {"RATE", fmt::format("{:g}", model.settings.sample_rate_Hz)},
+                {"NOT_MEASURED", inputs_text(inputs, options)},
                 {"PARAMETERS", parameters_text(inputs)}});
   program.source = c.filled(
       R"c(/* $NAME$.c: see $NAME$.h. */
 #include "$NAME$.h"
 
-#ifdef __FAST_MATH__
-#error "Compile this file without -ffast-math: it hides values that are not numbers."
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "Compile this file without -ffast-math and -ffinite-math-only: they hide values that are not numbers."
 #endif
 
 #define @BOUNDLESS ((@real)1e30)

@@ -23,12 +23,12 @@ void check_counts(const CCounts& counts, const std::vector<std::string>& measure
                       .expected = "an angle in rad",
                       .found = counts.channel,
                       .advice = "Give the other inputs as numbers."});
-  if (!std::isfinite(counts.counts_per_turn) || std::abs(counts.counts_per_turn) < 1.0)
-    throw UsageError(
-        {.place = fmt::format("--counts of {}", counts.channel),
-         .expected =
-             "the counts of a turn, at least 1; negative if the angle falls where they rise",
-         .found = fmt::format("{}", counts.counts_per_turn)});
+  constexpr double kLargest = 2147483647.0;  // one turn of an int32_t
+  if (!(std::abs(counts.counts_per_turn) >= 1.0 && std::abs(counts.counts_per_turn) <= kLargest))
+    throw UsageError({.place = fmt::format("--counts of {}", counts.channel),
+                      .expected = "the counts of a turn, from 1 to 2147483647; negative if the "
+                                  "angle falls where they rise",
+                      .found = fmt::format("{}", counts.counts_per_turn)});
 }
 
 }  // namespace

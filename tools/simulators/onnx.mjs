@@ -41,6 +41,7 @@ const width = metadata.state_width;
 const feedsOf = (data, state) => {
   const feeds = { inputs: tensor(data, inputs.length) };
   if (width > 0) feeds.state = state;
+  if (session.inputNames.includes('timestep_s')) feeds.timestep_s = tensor(Numbers.of(1 / metadata.sample_rate_Hz), 1);
   return feeds;
 };
 const zeroState = (joints) => (width > 0 ? tensor(new Numbers(joints * width), width) : undefined);

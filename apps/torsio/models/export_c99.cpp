@@ -7,11 +7,13 @@
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "files/output_file.hpp"
 #include "models/export_flags.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -201,8 +203,13 @@ void export_c99(ExportFlags& flags) {
   }
   make_folder(flags.output);
   for (const std::string& file : {header, source}) require_new(flags, file);
-  write_text(header, program.header);
-  write_text(source, program.source);
+  // Both or none: a full disk must not leave the header of one program beside the source of another.
+  torsio::OutputFile header_file(header);
+  torsio::OutputFile source_file(source);
+  header_file.write(std::as_bytes(std::span(program.header)));
+  source_file.write(std::as_bytes(std::span(program.source)));
+  header_file.commit();
+  source_file.commit();
   if (flags.json.wants_tables())
     print(fmt::format(
         "{} and {} written: {}, {}, {} Hz\n{}", header, source, model.parameters.family(),

@@ -24,7 +24,7 @@ struct OnnxOptions {
 /// A model as an ONNX file (library `torsio::onnx`): operator set 13, weights inside.
 ///
 /// `estimator` has the inputs `inputs` (joints x raw inputs, SI) and `state` (joints x width; zeros are the state after a
-/// reset), and the outputs `value`, `std_dev`, `fault` (int32, as `Fault`) and `next_state`. Names, units and the sample rate
+/// reset) and, unless the model does not depend on time, `timestep_s` (1 x 1), and the outputs `value`, `std_dev`, `fault` (int32, as `Fault`) and `next_state`. Names, units and the sample rate
 /// are in its metadata.
 /// @throws UsageError for another family, or features that the layout does not have
 [[nodiscard]] std::string onnx_bytes(const ModelFile& model, const OnnxOptions& options = {});

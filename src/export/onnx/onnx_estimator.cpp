@@ -153,13 +153,9 @@ class EstimatorWriter {
     }
   }
 
-  /// An input with a value, which a program may leave out.
   std::string timestep() {
-    std::string name = "timestep_s";
-    const std::vector<double> period{1.0 / graph_.sample_rate_Hz};
-    onnx_.input(name, wide_, {1, 1});
-    onnx_.initial_value(name, period, wide_ == OnnxType::FLOAT, {1, 1});
-    return name;
+    onnx_.input("timestep_s", wide_, {1, 1});
+    return "timestep_s";
   }
 
   std::string cast(const std::string& name, int type) {

@@ -129,20 +129,6 @@ void OnnxGraph::output(const std::string& name, int type, const std::vector<std:
   describe(*graph_.add_output(), name, type, shape);
 }
 
-void OnnxGraph::initial_value(const std::string& input, std::span<const double> values,
-                              bool is_single, const std::vector<std::int64_t>& shape) {
-  onnx::TensorProto& tensor = *graph_.add_initializer();
-  tensor.set_name(input);
-  for (const std::int64_t size : shape) tensor.add_dims(size);
-  tensor.set_data_type(is_single ? onnx::TensorProto::FLOAT : onnx::TensorProto::DOUBLE);
-  for (const double value : values) {
-    if (is_single)
-      tensor.add_float_data(static_cast<float>(value));
-    else
-      tensor.add_double_data(value);
-  }
-}
-
 void OnnxGraph::metadata(const std::string& key, const std::string& value) {
   onnx::StringStringEntryProto& entry = *model_.add_metadata_props();
   entry.set_key(key);

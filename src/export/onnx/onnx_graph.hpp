@@ -34,9 +34,6 @@ class OnnxGraph {
   /// A dimension below 0 is the number of joints.
   void input(const std::string& name, int type, const std::vector<std::int64_t>& shape);
   void output(const std::string& name, int type, const std::vector<std::int64_t>& shape);
-  /// The value of an input that a program does not give.
-  void initial_value(const std::string& input, std::span<const double> values, bool is_single,
-                     const std::vector<std::int64_t>& shape);
   void metadata(const std::string& key, const std::string& value);
   void description(const std::string& text) { model_.set_doc_string(text); }
 
