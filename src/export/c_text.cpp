@@ -6,7 +6,6 @@
 #include <cfloat>
 #include <cmath>
 #include <cstdint>
-#include <ranges>
 
 #include "export/c_math.hpp"
 #include "torsio/core/error.hpp"
@@ -148,9 +147,10 @@ std::size_t CText::size_of(std::string_view name) const {
 std::string CText::functions() const {
   std::string text = functions_;
   // From the last to the first, since each may call those before it.
-  for (const CMathFunction& function : std::views::reverse(c_math(real_)))
-    if (text.find(filled(function.call)) != std::string::npos)
-      text.insert(0, filled(function.text));
+  const std::span<const CMathFunction> provided = c_math(real_);
+  for (auto function = provided.rbegin(); function != provided.rend(); ++function)
+    if (text.find(filled(function->call)) != std::string::npos)
+      text.insert(0, filled(function->text));
   return text;
 }
 
