@@ -13,3 +13,4 @@
 #include "torsio/data/mapping.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/data/write.hpp"
+#include "torsio/joint_load/known_load.hpp"

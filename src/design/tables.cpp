@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "core/did_you_mean.hpp"
+#include "core/quantity.hpp"
 #include "data/yaml_reader.hpp"
-#include "design/quantity.hpp"
 #include "shipped_tables.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -53,6 +53,7 @@ constexpr auto kFmiUnits = std::to_array<FmiUnit>({
     {"m_s", R"(m="1" s="-1")"},
     {"m_s2", R"(m="1" s="-2")"},
     {"kg", R"(kg="1")"},
+    {"kg_m2", R"(kg="1" m="2")"},
     {"J", R"(kg="1" m="2" s="-2")"},
     {"Pa", R"(kg="1" m="-1" s="-2")"},
     {"K", R"(K="1")"},

@@ -5,8 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/quantity.hpp"
 #include "design/outline.hpp"
-#include "design/quantity.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/design/tables.hpp"

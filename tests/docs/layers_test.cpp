@@ -131,7 +131,7 @@ TEST(Layers, AreThoseOfTheTable) {
   EXPECT_EQ(found.folder_of("fit/grey_box/fit_grey_box.cpp"), "fit/grey_box");
   EXPECT_EQ(found.folder_of("data/csv/csv.cpp"), "data");
   EXPECT_EQ(found.folders.at("core").library, "runtime");
-  EXPECT_THAT(found.uses.at("learn"), ElementsAre("data", "files", "realtime", "runtime"));
+  EXPECT_THAT(found.uses.at("learn"), ElementsAre("arm", "data", "files", "realtime", "runtime"));
   EXPECT_THAT(found.uses.at("bench"),
               ElementsAre("arm", "data", "files", "link", "realtime", "runtime"));
   EXPECT_TRUE(found.uses.at("coupling").contains("trials"));

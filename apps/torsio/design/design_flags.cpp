@@ -1,7 +1,7 @@
 #include "design/design_flags.hpp"
 
 #include "common/data_flags.hpp"
-#include "design/quantity.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
 

@@ -1,4 +1,4 @@
-#include "design/quantity.hpp"
+#include "core/quantity.hpp"
 
 #include <charconv>
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace torsio {
 
-double quantity_with_unit(std::string_view text, std::string_view expected_si,
-                          std::string_view place) {
+double signed_quantity_with_unit(std::string_view text, std::string_view expected_si,
+                                 std::string_view place) {
   const std::string_view all = trimmed(text);
   double number = 0.0;
   const auto [end, code] = std::from_chars(all.data(), all.data() + all.size(), number);
@@ -19,7 +19,12 @@ double quantity_with_unit(std::string_view text, std::string_view expected_si,
         {.place = std::string(place),
          .expected = "a number with its unit, a multiple of " + std::string(expected_si),
          .found = "'" + std::string(text) + "'"});
-  const double value = si_quantity(text, expected_si, place);
+  return si_quantity(text, expected_si, place);
+}
+
+double quantity_with_unit(std::string_view text, std::string_view expected_si,
+                          std::string_view place) {
+  const double value = signed_quantity_with_unit(text, expected_si, place);
   if (value < 0.0)
     throw UsageError({.place = std::string(place),
                       .expected = "a value that is not negative",
