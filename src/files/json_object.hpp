@@ -84,6 +84,11 @@ class JsonObject {
     });
     return result;
   }
+  /// read(JsonObject) for an object of this one.
+  template <class Read>
+  [[nodiscard]] auto object(const char* key, Read read) const {
+    return read(JsonObject(member(key), place_of(key), advice_));
+  }
   [[nodiscard]] std::map<std::string, std::string> text_map(const char* key) const {
     return map<std::string>(key, &JsonObject::text_of);
   }

@@ -47,6 +47,7 @@ ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Opti
   card.options = options.values();
   card.seed = seed;
   card.zeros = training_zeros(dataset);
+  card.load_target = dataset.load_target;
   add_training_files(card, dataset);
   return card;
 }

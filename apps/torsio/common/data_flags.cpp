@@ -16,7 +16,9 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
+#include "torsio/fit/common/load_target.hpp"
 #include "torsio/fit/families.hpp"
+#include "torsio/joint_load/known_load.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace {
@@ -127,6 +129,17 @@ void DataFlags::add_initialise(CLI::App& verb) {
       ->capture_default_str();
 }
 
+void DataFlags::add_load(CLI::App& verb, const char* help) {
+  verb.add_option("--load", load_file, help);
+}
+
+void DataFlags::compute_target(torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                               const torsio::LoadTarget& before) const {
+  if (load_file.empty()) return;
+  torsio::add_load_target(dataset, torsio::read_load_sheet(load_file), features, before);
+  for (const std::string& note : torsio::load_target_notes(dataset.load_target)) remark(note);
+}
+
 void DataFlags::require_recordings() const {
   if (recordings.empty())
     throw torsio::UsageError(
@@ -159,6 +172,7 @@ torsio::LoadOptions DataFlags::load_options(const torsio::Progress& progress) co
   options.default_mapping_place = model_mapping_place_;
   if (!rate.empty()) options.rate_Hz = torsio::si_quantity(rate, "Hz", "--rate");
   options.target = target;
+  options.computes_target = !load_file.empty();
   options.joint = joint;
   return options;
 }
@@ -240,7 +254,7 @@ torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
     for (torsio::Segment& segment : record.segments) segment.role = torsio::Role::validation;
     dataset.records.push_back(std::move(record));
   }
-  dataset.check();
+  if (load_file.empty()) dataset.check();
   return dataset;
 }
 
@@ -270,6 +284,7 @@ void DataFlags::check_outputs(const std::vector<std::string>& outputs,
   check_not_read(recordings);
   check_not_read(more_inputs);
   check_not_read({mapping});
+  check_not_read({load_file});
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     if (outputs[i].empty()) continue;
     require_writable(outputs[i]);

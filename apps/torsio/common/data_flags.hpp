@@ -22,6 +22,7 @@ struct DataFlags {
   std::string rate;
   std::string target;
   std::string inputs;
+  std::string load_file;  ///< from which the target is computed
   std::size_t initialise = torsio::Dataset{}.initialise_samples;
 
   void add_recordings(CLI::App& verb, const char* help);
@@ -30,6 +31,7 @@ struct DataFlags {
   void add_model_mapping(CLI::App& verb);
   void add_target_and_inputs(CLI::App& verb);
   void add_initialise(CLI::App& verb);
+  void add_load(CLI::App& verb, const char* help);
 
   /// Recordings are read with the mapping that the model was trained with, unless `--mapping` or a
   /// manifest gives another; `--mapping none`: without.
@@ -50,6 +52,10 @@ struct DataFlags {
                                             const torsio::Progress& progress) const;
   [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
+  /// With `--load` the target becomes the torque of the known load (`torsio::add_load_target`), with remarks.
+  /// @param before how that of a model was computed
+  void compute_target(torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                      const torsio::LoadTarget& before = {}) const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
   /// are the same file, or whose folder does not exist. `load` and `load_as_test` compare them again
   /// with the files that a manifest names.

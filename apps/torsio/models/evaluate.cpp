@@ -11,6 +11,7 @@
 #include "report/html/model_report.hpp"
 #include "report/model_description.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
@@ -49,10 +50,24 @@ torsio::Recording prediction_recording(const torsio::ScoredRun& run) {
   return result;
 }
 
+/// The channel of `--target` as it is named inside torsio. @throws UsageError unless it is of the model's quantity.
+std::string target_for(const torsio::ModelFile& file, const std::string& wanted) {
+  const auto name = torsio::split_channel_name(wanted);
+  const auto own = torsio::split_channel_name(file.settings.target);
+  if (!name || !own || name->unit->si_suffix != own->unit->si_suffix)
+    throw torsio::UsageError(
+        {.place = "--target " + wanted,
+         .expected = "a channel in the unit of the model's target, " + file.settings.target,
+         .found = name ? "one in " + std::string(name->unit->si_suffix) : "a name without a unit"});
+  return name->si();
+}
+
 /// Without recordings they would be ignored.
 void require_no_flags_of_recordings(const EvaluateFlags& flags) {
   for (const auto& [flag, value] : {std::pair{"--predictions", flags.predictions},
                                     {"--mapping", flags.data.mapping},
+                                    {"--target", flags.data.target},
+                                    {"--load", flags.data.load_file},
                                     {"--rate", flags.data.rate}})
     if (!value.empty())
       throw torsio::UsageError(
@@ -86,8 +101,10 @@ void run(EvaluateFlags& flags) {
   }
   DataFlags data = flags.data;
   data.use_model(file, flags.model);
+  if (!flags.data.target.empty()) data.target = target_for(file, flags.data.target);
   ProgressBar progress;
-  const torsio::Dataset dataset = data.load_as_test(progress.listener());
+  torsio::Dataset dataset = data.load_as_test(progress.listener());
+  data.compute_target(dataset, file.settings.features, file.card.load_target);
   if (!flags.predictions.empty() && dataset.records.size() != 1)
     throw torsio::UsageError({.place = "--predictions",
                               .expected = "one recording",
@@ -128,6 +145,12 @@ void add_evaluate(CLI::App& app) {
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
   flags->data.add_model_mapping(*verb);
+  verb->add_option("--target", flags->data.target,
+                   "channel to compare the estimate with, in the unit of the model's target "
+                   "(default: the model's target)");
+  flags->data.add_load(*verb,
+                       "load file: compare the estimate with the torque of this known load "
+                       "(docs/use/known_load.md)");
   flags->data.add_initialise(*verb);
   verb->add_option("--predictions", flags->predictions,
                    "write target, estimate, error bar and fault of one recording as CSV");

@@ -154,8 +154,9 @@ void run_one(FitFlags& flags) {
       flags.validation);
   require_model_file(flags.output);
   ProgressBar progress;
-  const torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
+  torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+  flags.data.compute_target(dataset, features);
   const torsio::FitCheck check = torsio::check_for_fit(dataset, features, flags.allow_leak);
   warn_of_failed_checks(check);
   torsio::ReportedFit fit =
@@ -186,6 +187,10 @@ void add_fit(CLI::App& app) {
   flags->data.add_recordings(*verb, "recordings to train on, or a manifest with roles");
   flags->data.add_mapping(*verb);
   flags->data.add_target_and_inputs(*verb);
+  flags->data.add_load(
+      *verb,
+      "load file: the target is the torque of this known load instead of that of a "
+      "sensor (docs/use/known_load.md)");
   verb->add_option("--model", flags->family, "family; --list shows them");
   verb->add_option("--set", flags->settings, "set an option of the family, option=value")
       ->allow_extra_args(false);

@@ -64,6 +64,7 @@ Checked checked(const CheckFlags& flags) {
     ProgressBar progress;
     torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+    flags.data.compute_target(dataset, spec);
     const auto wanted = wanted_of(flags, dataset, spec);  // a wrong call before any work
     Checked result{.findings = {{torsio::Verdict::pass, "clock", "", "uniform", ""}}, .advice = {}};
     std::ranges::move(torsio::check_dataset(dataset, spec), std::back_inserter(result.findings));
@@ -140,6 +141,9 @@ void add_check(CLI::App& app) {
   flags->data.add_recordings(*verb, "recordings, or a manifest");
   flags->data.add_mapping(*verb);
   flags->data.add_target_and_inputs(*verb);
+  flags->data.add_load(*verb,
+                       "load file: the target is the torque of this known load "
+                       "(docs/use/known_load.md)");
   verb->add_option("--test", flags->test,
                    "held-out recordings: are they inside the training range?");
   verb->add_flag("--list", flags->list,

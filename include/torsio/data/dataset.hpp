@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/core/load_target.hpp"
 #include "torsio/data/recording.hpp"
 
 namespace torsio {
@@ -42,6 +43,10 @@ struct Dataset {
   /// Channels that the target was computed from ("torque from motor current"): a leak if used as an
   /// input.
   std::vector<std::string> target_computed_from;
+  /// The target is the torque of a known load (`add_load_target`); not `is_used`: it was measured.
+  LoadTarget load_target = {};
+  /// Channel with the standard error of each value of such a target; empty: it was measured.
+  std::string target_error = {};
   /// Measured samples at the start of each recording that initialise a model with memory; they
   /// are not scored.
   std::size_t initialise_samples = 50;

@@ -81,6 +81,8 @@ struct LoadOptions {
   /// All records are brought to this rate; it is also the clock of a log that has none.
   std::optional<double> rate_Hz;
   std::string target;  ///< empty: the manifest's, else torque_Nm
+  /// The caller adds the target (`add_load_target`): the recordings need not have it.
+  bool computes_target = false;
   /// Role where none is given: a CSV file of the first list, a manifest's file without role or
   /// split.
   Role role = Role::train;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "torsio/core/estimate.hpp"
+#include "torsio/core/load_target.hpp"
 #include "torsio/core/provenance.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
@@ -32,6 +33,7 @@ struct ModelCard {
   std::uint64_t seed = 0;
   std::vector<Source> training_files;
   std::vector<ZeroRule> zeros;  ///< how the training records were zeroed
+  LoadTarget load_target = {};  ///< the load that the target was computed from, if it was
   /// The mapping of the training records as text (`mapping_text`); empty: none, or several.
   std::string mapping = {};
   std::string held_out;                   ///< description of the samples of `metrics`

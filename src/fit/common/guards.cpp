@@ -60,11 +60,55 @@ void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
   }
 }
 
+/// The region of a value.
+std::size_t region_of(const ResidualTable& table, double value) {
+  const auto inner = std::span(table.edges).subspan(1, table.std_dev.size() - 1);
+  return static_cast<std::size_t>(std::ranges::upper_bound(inner, value) - inner.begin());
+}
+
 /// The error bar at a value.
 double std_dev_at(const ResidualTable& table, double value) {
-  const auto inner = std::span(table.edges).subspan(1, table.std_dev.size() - 1);
-  return table
-      .std_dev[static_cast<std::size_t>(std::ranges::upper_bound(inner, value) - inner.begin())];
+  return table.std_dev[region_of(table, value)];
+}
+
+/// Mean square of the standard errors of a computed target, by region of the table and over all usable samples.
+struct TargetErrors {
+  std::vector<double> of_regions;
+  double of_all = 0.0;
+};
+
+TargetErrors target_errors(const ResidualTable& table, const TrainingData& data) {
+  const std::size_t regions = std::max<std::size_t>(table.std_dev.size(), 1);
+  std::vector<double> squares(regions, 0.0);
+  std::vector<double> counts(regions, 0.0);
+  for (const Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < sequence.target_error.size(); ++n) {
+      if (sequence.use[n] == 0 || !std::isfinite(sequence.target_error[n])) continue;
+      const std::size_t region = table.std_dev.empty() ? 0 : region_of(table, sequence.target[n]);
+      squares[region] += sequence.target_error[n] * sequence.target_error[n];
+      counts[region] += 1.0;
+    }
+  TargetErrors errors;
+  const double all = std::accumulate(counts.begin(), counts.end(), 0.0);
+  if (all > 0.0) errors.of_all = std::accumulate(squares.begin(), squares.end(), 0.0) / all;
+  for (std::size_t r = 0; r < regions; ++r)
+    errors.of_regions.push_back(counts[r] > 0.0 ? squares[r] / counts[r] : errors.of_all);
+  return errors;
+}
+
+/// What the residuals do not show: a model that agrees with a wrong target is as wrong as this. The error of a computed
+/// target is independent of the model's own; the variances add.
+void add_target_errors(EstimatorSettings& settings, const TrainingData& data, double own_std_dev) {
+  const TargetErrors errors = target_errors(settings.residuals, data);
+  if (!(errors.of_all > 0.0)) return;
+  for (std::size_t r = 0; r < settings.residuals.std_dev.size(); ++r)
+    settings.residuals.std_dev[r] = std::sqrt(
+        settings.residuals.std_dev[r] * settings.residuals.std_dev[r] + errors.of_regions[r]);
+  settings.fallback.residual_std =
+      std::sqrt(settings.fallback.residual_std * settings.fallback.residual_std + errors.of_all);
+  double& factor = settings.output.error_bar_factor;
+  if (own_std_dev > 0.0)
+    factor = std::sqrt(factor * factor + errors.of_all / (own_std_dev * own_std_dev));
 }
 
 }  // namespace
@@ -190,6 +234,7 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
       settings.output.error_bar_factor =
           std::max(settings.output.error_bar_factor, least / held_out.own_std_dev);
   }
+  add_target_errors(settings, validation != nullptr ? *validation : training, held_out.own_std_dev);
   settings.output.largest_target = 0.0;
   for_each_usable(training, [&](std::span<const double>, double target) {
     settings.output.largest_target = std::max(settings.output.largest_target, std::abs(target));

@@ -14,6 +14,7 @@
 #include "core/all_finite.hpp"
 #include "data/finest_step.hpp"
 #include "data/recording_rows.hpp"
+#include "fit/common/load_leak.hpp"
 #include "fit/common/passes.hpp"
 #include "numerics/golden_section.hpp"
 #include "numerics/least_squares.hpp"
@@ -195,6 +196,8 @@ std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
             dataset.target_computed_from.end() ||
         is_straight_line(dataset, input))
       return input;
+  if (dataset.load_target.is_used())
+    if (std::string leak = load_leak(spec); !leak.empty()) return leak;
   FeatureSpec first = spec;
   first.inputs.resize(1);
   if (is_plane(dataset, first)) return spec.inputs.front();
@@ -218,6 +221,10 @@ std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool al
 }
 
 std::string leak_advice(const Dataset& dataset, const FeatureSpec& spec, const std::string& leak) {
+  if (dataset.load_target.is_used() && leak == load_leak(spec))
+    return "The torque of a known load follows from the joint's angle and acceleration: choose "
+           "inputs in which an angle "
+           "only occurs in the deflection of the spring, and speeds.";
   const bool is_one_of_several = spec.inputs.size() > 1 && leak != spec.inputs.front() &&
                                  std::ranges::find(spec.inputs, leak) != spec.inputs.end();
   if (is_one_of_several || leak.starts_with(kTruthPrefix) ||

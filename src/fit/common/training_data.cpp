@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "data/recording_rows.hpp"
@@ -96,14 +97,16 @@ void replace_outliers(RecordingRows& rows, std::size_t input, const Recording& r
   rows.replace(input, std::move(values));
 }
 
-Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::string& target,
+Sequence run(const Dataset& dataset, const DatasetRecord& record, FeaturePipeline& pipeline,
              Role role, const ChannelLimits& limits, std::vector<LeftOut>& left_out) {
+  const auto& [target, target_error] = std::tie(dataset.target, dataset.target_error);
   const Recording& recording = record.recording;
   const Channel& measured = recording.channel(target);
   Sequence sequence{.recording = recording.name(),
                     .features = Matrix(recording.size(), pipeline.feature_count()),
                     .target = measured.values,
                     .use = role_mask(record, role)};
+  if (!target_error.empty()) sequence.target_error = recording.channel(target_error).values;
   for (std::size_t n = 0; n < recording.size(); ++n) {
     if (limits.at(target).contain(measured.values[n])) continue;
     if (sequence.use[n] != 0 && measured.is_fresh(n))
@@ -208,7 +211,7 @@ TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role
   std::vector<double> travels(records.size());
   for_each_chunk(records.size(), 0, [&](std::size_t r) {
     FeaturePipeline own = pipeline;
-    data.sequences[r] = run(*records[r], own, dataset.target, role, limits, left_out[r]);
+    data.sequences[r] = run(dataset, *records[r], own, role, limits, left_out[r]);
     travels[r] = largest_travel(*records[r], data.sequences[r], role);
   });
   for (std::size_t r = 0; r < records.size(); ++r) {

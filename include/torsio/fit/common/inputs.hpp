@@ -32,7 +32,8 @@ namespace torsio {
 
 /// A raw input that the target was computed from, declared by the dataset or found in the data (the
 /// target is a linear function of the input to 3e-5 of its spread), or all inputs if they give the
-/// target only together; empty if there is none. Such an input is a leak: a score with it means
+/// target only together; where the target is the torque of a known load, an input that has the angle or the acceleration of
+/// one side of the spring by itself; empty if there is none. Such an input is a leak: a score with it means
 /// nothing.
 [[nodiscard]] std::string find_leak(const Dataset& dataset, const FeatureSpec& spec);
 

@@ -24,6 +24,8 @@ struct Sequence {
   std::string recording;
   Matrix features = {};             ///< samples x inputs
   std::vector<double> target = {};  ///< NaN where not measured
+  /// Standard error of each value of a target that was computed; empty: it was measured.
+  std::vector<double> target_error = {};
   /// 1: usable for training (role, settled filters, fresh and finite target, finite features)
   std::vector<std::uint8_t> use = {};
 
