@@ -86,6 +86,7 @@ void Checker::run_checks(bool with_warnings) {
   }
   check_offsets();
   check_leak();
+  check_known_load();
   check_training();
   if (with_warnings) check_range();
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "check/checker.hpp"
 #include "data/finest_step.hpp"
@@ -64,13 +65,29 @@ std::vector<SampleRange> ranges_where(const Channel& channel, const Condition& i
 
 }  // namespace
 
+namespace {
+
+/// Without the samples at either end that have no value, as the torque of a known load: its acceleration looks back and
+/// ahead. All of them if none has one.
+std::span<const double> between_ends(std::span<const double> values) {
+  const auto has_value = [](double value) { return is_finite(value); };
+  const auto first = std::ranges::find_if(values, has_value);
+  if (first == values.end()) return values;
+  const auto after = std::find_if(values.rbegin(), values.rend(), has_value).base();
+  return {first, after};
+}
+
+}  // namespace
+
 void Checker::check_missing() {
   pass_unless_found("missing values", "none", [&] {
     for_each_channel([&](const Recording& recording, const Channel& channel) {
-      const auto missing = static_cast<std::size_t>(
-          std::ranges::count_if(channel.values, [](double v) { return !is_finite(v); }));
-      if (missing == 0) return;
       const bool is_target = channel.name == dataset_.target;
+      std::span<const double> values = channel.values;
+      if (is_target && dataset_.load_target.is_used()) values = between_ends(values);
+      const auto missing = static_cast<std::size_t>(
+          std::ranges::count_if(values, [](double v) { return !is_finite(v); }));
+      if (missing == 0) return;
       const double share =
           static_cast<double>(missing) / static_cast<double>(channel.values.size());
       add(is_target && share < 1.0 ? Verdict::warn : Verdict::fail, "missing values",

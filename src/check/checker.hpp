@@ -179,6 +179,7 @@ class Checker {
   void check_offsets();
   void report_line(std::size_t r, const RecordLine& line, double spread);
   void check_leak();
+  void check_known_load();
   void check_training();
   [[nodiscard]] bool check_determination(const TrainingData& data);
   void check_range();

@@ -196,8 +196,7 @@ class Collector {
                         .expected = "a positive number of Hz",
                         .found = fmt::format("{}", *options_.rate_Hz)});
     if (options_.mapping) mapping_ = mapping_from(*options_.mapping);
-    if (!options_.default_mapping.empty())
-      default_mapping_ = parse_mapping(options_.default_mapping, options_.default_mapping_place);
+    if (!options_.default_mapping.empty()) default_mapping_ = mapping_of_model();
     dataset_.target = options_.target;
   }
 
@@ -326,6 +325,17 @@ class Collector {
                         .problem = "the manifests disagree",
                         .expected = current,
                         .found = given});
+  }
+
+  /// Without dropping the target: a model of a computed torque is trained without the column of the sensor, with which it
+  /// may be compared.
+  [[nodiscard]] Mapping mapping_of_model() const {
+    Mapping mapping = parse_mapping(options_.default_mapping, options_.default_mapping_place);
+    if (!options_.computes_target)
+      std::erase_if(mapping.drop, [&](const std::string& pattern) {
+        return is_matched(options_.target, pattern);
+      });
+    return mapping;
   }
 
   [[nodiscard]] Mapping mapping_from(const std::string& path) {

@@ -11,6 +11,7 @@
 #include "files/family_names.hpp"
 #include "files/json_object.hpp"
 #include "files/json_text.hpp"
+#include "files/load_target_json.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/units.hpp"
@@ -57,53 +58,6 @@ ordered_json list_of(const std::vector<T>& values, Write write) {
   return list;
 }
 
-ordered_json load_json(const LoadTarget& load) {
-  return {{"file", load.file},
-          {"computed_from", load.computed_from},
-          {"half_width_s", load.half_width_s},
-          {"motion_error_Nm", load.motion_error_Nm},
-          {"load_error_Nm", load.load_error_Nm},
-          {"loads", list_of(load.loads,
-                            [](const LoadTarget::OfRecording& of) {
-                              return ordered_json{{"recording", of.recording},
-                                                  {"gravity_Nm", of.gravity_Nm},
-                                                  {"inertia_kg_m2", of.inertia_kg_m2},
-                                                  {"zero_rad", of.zero_rad},
-                                                  {"motion_error_Nm", of.motion_error_Nm}};
-                            })},
-          {"facts", list_of(load.facts,
-                            [](const LoadTarget::OfFact& of) {
-                              return ordered_json{{"fact", of.fact}, {"error_Nm", of.error_Nm}};
-                            })},
-          {"fitted", list_of(load.fitted, [](const LoadTarget::Fitted& of) {
-             return ordered_json{
-                 {"fact", of.fact}, {"value", of.value}, {"standard_error", of.standard_error}};
-           })}};
-}
-
-LoadTarget load_of_json(const JsonObject& load) {
-  return {
-      .file = load.text("file"),
-      .computed_from = load.texts("computed_from"),
-      .half_width_s = load.number("half_width_s"),
-      .motion_error_Nm = load.number("motion_error_Nm"),
-      .load_error_Nm = load.number("load_error_Nm"),
-      .loads = load.objects("loads",
-                            [](const JsonObject& of) {
-                              return LoadTarget::OfRecording{
-                                  of.text("recording"), of.number("gravity_Nm"),
-                                  of.number("inertia_kg_m2"), of.number("zero_rad"),
-                                  of.number("motion_error_Nm")};
-                            }),
-      .facts = load.objects("facts",
-                            [](const JsonObject& of) {
-                              return LoadTarget::OfFact{of.text("fact"), of.number("error_Nm")};
-                            }),
-      .fitted = load.objects("fitted", [](const JsonObject& of) {
-        return LoadTarget::Fitted{of.text("fact"), of.number("value"), of.number("standard_error")};
-      })};
-}
-
 }  // namespace
 
 std::string card_json(const ModelFile& model) {
@@ -128,7 +82,7 @@ std::string card_json(const ModelFile& model) {
         {"channel", zero.channel}, {"first_s", zero.first_s}, {"mid_range", zero.mid_range}};
   });
   if (!card.mapping.empty()) json_card["mapping"] = card.mapping;
-  if (card.load_target.is_used()) json_card["load"] = load_json(card.load_target);
+  if (card.load_target.is_used()) json_card["load"] = load_target_json(card.load_target);
   json_card["training_files"] = list_of(card.training_files, [](const Source& source) {
     return ordered_json{{"file", source.file}, {"sha256", source.sha256}};
   });
@@ -169,7 +123,7 @@ ModelFile model_of_card(std::string_view text, const std::string& place) {
                               return ZeroRule{zero.text("channel"), zero.number("first_s"),
                                               zero.boolean("mid_range")};
                             }),
-      .load_target = card.has("load") ? card.object("load", load_of_json) : LoadTarget{},
+      .load_target = card.has("load") ? card.object("load", load_target_of) : LoadTarget{},
       .mapping = card.optional_text("mapping"),
       .held_out = card.text("held_out"),
       .metrics = card.number_map("metrics"),

@@ -13,10 +13,12 @@
 #include <vector>
 
 #include "files/known_families.hpp"
+#include "files/load_target_json.hpp"
 #include "model/common/parameters.hpp"
 #include "report/json_text.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/fit/common/load_target.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/model/network/network_layers.hpp"
 #include "torsio/report/text_table.hpp"
@@ -192,6 +194,11 @@ std::string mapping_lines(const ModelCard& card) {
   return text;
 }
 
+std::string load_lines(const ModelCard& card) {
+  if (!card.load_target.is_used()) return {};
+  return fmt::format("{}\n", fmt::join(load_target_notes(card.load_target), "\n"));
+}
+
 std::string cycle_text(const SlowCycle& cycle) {
   if (!cycle.reason.empty())
     return fmt::format("stiffness, loop width and friction cannot be determined: {}\n",
@@ -290,6 +297,7 @@ std::string model_description(const ModelFile& model, const SlowCycle& cycle) {
   text += adaptation_lines(model.card);
   text += score_line(model);
   text += zero_line(settings);
+  text += load_lines(model.card);
   text += mapping_lines(model.card);
   text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
@@ -306,6 +314,8 @@ std::string model_description_json(const ModelFile& model, const SlowCycle& cycl
                 {"inputs", Json::array()},
                 {"trained_on", Json::array()},
                 {"mapping", text_or_null(model.card.mapping)},
+                {"load", model.card.load_target.is_used() ? load_target_json(model.card.load_target)
+                                                          : Json()},
                 {"options", model.card.options},
                 {"held_out", model.card.held_out},
                 {"metrics", model.card.metrics},

@@ -11,6 +11,7 @@
 #include "report/html/time_figure_builder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/fit/common/load_target.hpp"
 
 namespace torsio {
 namespace {
@@ -165,6 +166,8 @@ ReportSection card_section(const ModelFile& file, const std::string& title) {
   add("seed", fmt::format("{}", card.seed));
   for (const Source& source : card.training_files)
     add("trained on", fmt::format("{}, SHA-256 {}", source.file, source.sha256));
+  if (card.load_target.is_used())
+    add("known load", fmt::format("{}", fmt::join(load_target_notes(card.load_target), "; ")));
   add("scored on", card.held_out);
   for (const auto& [metric, value] : card.metrics) add(metric, fmt::format("{:.4g}", value));
   add("device", card.device_serial);
