@@ -77,6 +77,7 @@ int run(int argc, char** argv) {
   add_joint(app);
   add_check(app);
   add_fit(app);
+  add_identify(app);
   add_evaluate(app);
   add_drift(app);
   add_estimate(app);

@@ -10,6 +10,7 @@ void add_arm(CLI::App& app);
 void add_joint(CLI::App& app);
 void add_check(CLI::App& app);
 void add_fit(CLI::App& app);
+void add_identify(CLI::App& app);
 void add_drift(CLI::App& app);
 void add_estimate(CLI::App& app);
 void add_evaluate(CLI::App& app);

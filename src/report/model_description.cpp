@@ -26,6 +26,8 @@
 namespace torsio {
 namespace {
 
+using DescriptionJson = nlohmann::ordered_json;
+
 constexpr std::size_t kReadable = 32;
 
 /// A tensor of the model, as a list of numbers.
@@ -228,16 +230,15 @@ std::string cycle_text(const SlowCycle& cycle) {
 }
 
 nlohmann::ordered_json cycle_json(const SlowCycle& cycle) {
-  using Json = nlohmann::ordered_json;
   if (!cycle.reason.empty()) return {{"status", "undetermined"}, {"reason", cycle.reason}};
-  Json points = Json::array();
+  DescriptionJson points = DescriptionJson::array();
   for (const SlowCycle::Point& point : cycle.points)
     points.push_back({{"deflection_rad", point.deflection_rad},
                       {"torque_Nm", point.torque_Nm},
                       {"stiffness_Nm_rad", point.stiffness_Nm_rad},
                       {"loop_width_Nm", point.loop_width_Nm},
                       {"friction_Nm", point.friction_Nm}});
-  Json held = Json::object();
+  DescriptionJson held = DescriptionJson::object();
   for (const auto& [channel, value] : cycle.held) held[channel] = value;
   return {{"status", "ok"},
           {"reason", nullptr},
@@ -306,20 +307,20 @@ std::string model_description(const ModelFile& model, const SlowCycle& cycle) {
 }
 
 std::string model_description_json(const ModelFile& model, const SlowCycle& cycle) {
-  using Json = nlohmann::ordered_json;
-  Json document{{"family", family_of(model)},
-                {"target", model.settings.target},
-                {"sample_rate_Hz", model.settings.sample_rate_Hz},
-                {"device_serial", model.card.device_serial},
-                {"inputs", Json::array()},
-                {"trained_on", Json::array()},
-                {"mapping", text_or_null(model.card.mapping)},
-                {"load", model.card.load_target.is_used() ? load_target_json(model.card.load_target)
-                                                          : Json()},
-                {"options", model.card.options},
-                {"held_out", model.card.held_out},
-                {"metrics", model.card.metrics},
-                {"parameters", Json::object()}};
+  DescriptionJson document{
+      {"family", family_of(model)},
+      {"target", model.settings.target},
+      {"sample_rate_Hz", model.settings.sample_rate_Hz},
+      {"device_serial", model.card.device_serial},
+      {"inputs", DescriptionJson::array()},
+      {"trained_on", DescriptionJson::array()},
+      {"mapping", text_or_null(model.card.mapping)},
+      {"load", model.card.load_target.is_used() ? load_target_json(model.card.load_target)
+                                                : DescriptionJson()},
+      {"options", model.card.options},
+      {"held_out", model.card.held_out},
+      {"metrics", model.card.metrics},
+      {"parameters", DescriptionJson::object()}};
   for (std::size_t j = 0; j < model.settings.features.inputs.size(); ++j)
     document["inputs"].push_back({{"expression", model.settings.features.inputs[j]},
                                   {"lowest", model.settings.ranges.lowest[j]},

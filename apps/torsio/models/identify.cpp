@@ -1,0 +1,197 @@
+#include "report/identify.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/data_flags.hpp"
+#include "common/output.hpp"
+#include "common/progress_bar.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/identify/drive/identify_drive.hpp"
+#include "torsio/identify/drive/write_drive.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct DriveIdentifyFlags {
+  DataFlags data;
+  std::string load;
+  std::string drive;
+  std::string terms = "auto";
+  std::string group_by;
+  std::string step;
+  std::size_t starts = torsio::IdentifyOptions{}.starts;
+  std::size_t threads = 0;
+  std::uint64_t seed = kDefaultSeed;
+  bool has_spring = false;
+  bool without_errors = false;
+  bool without_nested = false;
+  std::string output;
+  std::vector<std::pair<std::string, std::string>> written;  ///< target and file
+  std::string name = "servo";
+  JsonOutput json;
+};
+
+torsio::DriveTerms terms_of(const std::string& text) {
+  std::string known;
+  torsio::DriveTerms terms = torsio::drive_terms({torsio::DriveTerm::base});
+  for (const std::string& wanted : torsio::split_inputs(text)) {
+    bool is_known = false;
+    known.clear();
+    for (std::size_t k = 0; k < torsio::kDriveTerms; ++k) {
+      const std::string_view term = torsio::name(static_cast<torsio::DriveTerm>(k));
+      known += (known.empty() ? "" : ", ") + std::string(term);
+      if (term != wanted) continue;
+      terms.set(k);
+      is_known = true;
+    }
+    if (!is_known)
+      throw torsio::UsageError(
+          {.place = "--terms", .expected = "auto, or terms of " + known, .found = wanted});
+  }
+  return terms;
+}
+
+torsio::DriveTerms all_terms() { return torsio::DriveTerms().set(); }
+
+torsio::IdentifyOptions options_of(const DriveIdentifyFlags& flags,
+                                   const torsio::Progress& progress) {
+  torsio::IdentifyOptions options{.group_by = flags.group_by,
+                                  .starts = flags.starts,
+                                  .has_standard_errors = !flags.without_errors,
+                                  .has_nested_score = !flags.without_nested,
+                                  .seed = flags.seed,
+                                  .threads = flags.threads,
+                                  .progress = progress};
+  if (!flags.step.empty()) {
+    options.step_s = torsio::si_quantity(flags.step, "s", "--step");
+    if (!(options.step_s > 0.0))
+      throw torsio::UsageError(
+          {.place = "--step", .expected = "a time above 0", .found = flags.step});
+  }
+  if (flags.terms != "auto")
+    options.terms = terms_of(flags.terms);
+  else if (flags.has_spring)
+    options.largest = all_terms();
+  return options;
+}
+
+std::vector<torsio::Recording> recordings_of(const DriveIdentifyFlags& flags,
+                                             const torsio::Progress& progress) {
+  std::vector<torsio::Recording> recordings;
+  for (const std::string& file : flags.data.recordings)
+    for (torsio::Recording& recording :
+         torsio::load_recordings(file, flags.data.load_options(progress))) {
+      DataFlags::remark_on_reading(std::vector<const torsio::Recording*>{&recording});
+      recordings.push_back(std::move(recording));
+    }
+  return recordings;
+}
+
+std::string written_text(const std::string& target, const std::string& file,
+                         const torsio::WrittenDrive& written) {
+  std::string missing;
+  for (const std::string& term : written.not_expressed)
+    missing += (missing.empty() ? "" : ", ") + term;
+  return fmt::format(
+      "{} written for {}{}: {:.4f} rad mean |error| there, {:.4f} rad here; not expressed: {}",
+      file, target, written.model.empty() ? "" : " (" + written.model + ")", written.mae_rad,
+      written.own_mae_rad, missing.empty() ? "nothing" : missing);
+}
+
+void run(DriveIdentifyFlags& flags) {
+  if (flags.data.recordings.empty() || flags.load.empty())
+    throw torsio::UsageError(
+        {.place = "torsio identify",
+         .expected =
+             "recordings and --load load.yaml, the known load that gives the torque its scale",
+         .found = flags.data.recordings.empty() ? "no recordings" : "no --load",
+         .advice = "Example: torsio identify logs/*.json.gz --load pendulum.yaml -o servo.json"});
+  std::vector<std::string> inputs{flags.load};
+  if (!flags.drive.empty()) inputs.push_back(flags.drive);
+  std::vector<std::string> outputs{flags.output, flags.json.destination};
+  for (const auto& [target, file] : flags.written) {
+    (void)torsio::drive_target(target);
+    outputs.push_back(file);
+  }
+  flags.data.check_outputs(outputs, inputs);
+  const torsio::LoadSheet load = torsio::read_load_sheet(flags.load);
+  ProgressBar progress;
+  const std::vector<torsio::Recording> recordings = recordings_of(flags, progress.listener());
+  const torsio::DriveSheet drive = flags.drive.empty()
+                                       ? torsio::assumed_drive_sheet(recordings.front())
+                                       : torsio::read_drive_sheet(flags.drive);
+  if (flags.drive.empty())
+    remark("note: no --drive; the channels suggest the law '" +
+           std::string(torsio::name(drive.law)) + "'");
+  const torsio::IdentifyOptions options = options_of(flags, progress.listener());
+  const torsio::DriveIdentification identified =
+      torsio::identify_drive(recordings, load, drive, options);
+  std::vector<torsio::WrittenDrive> written;
+  written.reserve(flags.written.size());
+  for (const auto& [target, file] : flags.written)
+    written.push_back(torsio::write_drive(torsio::drive_target(target), identified, recordings,
+                                          flags.name, options));
+  if (flags.json.wants_tables()) print(torsio::identification_text(identified));
+  const std::string document = torsio::identification_json(identified);
+  flags.json.write(document);
+  for (std::size_t k = 0; k < written.size(); ++k) {
+    write_text(flags.written[k].second, written[k].text);
+    remark(written_text(flags.written[k].first, flags.written[k].second, written[k]));
+  }
+  if (!flags.output.empty()) write_text(flags.output, document);
+}
+
+}  // namespace
+
+void add_identify(CLI::App& app) {
+  auto flags = std::make_shared<DriveIdentifyFlags>();
+  CLI::App* verb = app.add_subcommand("identify",
+                                      "motor, friction and spring of a joint from its command, its "
+                                      "angle and a known load, without a torque sensor");
+  verb->footer(
+      "Example: torsio identify logs/*.json.gz --load pendulum.yaml -o servo.json\n"
+      "docs/use/identify.md has the equations, the files and what to record.");
+  flags->data.add_recordings(*verb, "recordings of the joint moving the load, or manifests");
+  flags->data.add_mapping(*verb);
+  verb->add_option("--load", flags->load, "file of the known load (docs/use/known_load.md)");
+  verb->add_option("--drive", flags->drive, "file of the drive's law; default: by the channels");
+  verb->add_option("--terms", flags->terms,
+                   "terms of the model beyond the base, separated by commas; auto: chosen by "
+                   "leaving out recordings")
+      ->capture_default_str();
+  verb->add_flag("--spring", flags->has_spring,
+                 "with --terms auto: begin with a second mass and its spring, hysteresis, backlash "
+                 "and bearing");
+  verb->add_option("--group-by", flags->group_by,
+                   "condition whose equal values are left out together, or 'recording' (default: "
+                   "by the number of recordings)");
+  verb->add_option("--starts", flags->starts, "starts of each search")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
+  verb->add_option("--step", flags->step,
+                   "longest step of the integrator (default: 2.5ms; with a spring 1ms)");
+  verb->add_option("--threads", flags->threads,
+                   "threads; the result does not depend on it (default: all)");
+  verb->add_flag("--no-standard-errors", flags->without_errors,
+                 "skip the fits without one recording each");
+  verb->add_flag("--no-nested", flags->without_nested,
+                 "skip the choice of the terms without each group");
+  add_seed(*verb, flags->seed, "seed of the starts");
+  verb->add_option("-o,--output", flags->output,
+                   "file of the identified drive (JSON); untouched unless the work succeeds");
+  verb->add_option("--write", flags->written,
+                   "TARGET FILE: the drive for another program, bam, mjcf or isaaclab, refitted "
+                   "with its step; repeatable")
+      ->type_name("TARGET FILE");
+  verb->add_option("--name", flags->name, "of the actuator in these files")->capture_default_str();
+  verb->add_option("--json", flags->json.destination,
+                   "write the result as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "torsio/joint_load/known_load.hpp"
+
+namespace torsio {
+
+/// How the command becomes the motor's torque.
+enum class CommandKind : std::uint8_t {
+  goal_to_duty,    ///< duty = gain (goal - angle), at most `limit`
+  goal_to_torque,  ///< torque = gain (goal - angle) - speed_gain angle', at most `limit`
+  duty,
+  current_A,
+  torque_Nm,
+};
+
+/// One recording as the free runs need it; the angle is that of the motor after the gear, or of the joint.
+struct DriveLog {
+  std::string name;
+  std::string group;  ///< recordings of one group are left out together
+  double sample_period_s = 0.0;
+  CommandKind kind = CommandKind::goal_to_duty;
+  std::vector<double> command;
+  std::vector<double> angle_rad;
+  std::vector<double> enabled;  ///< 1 or 0, a row per sample; empty: always 1
+  double gain = 0.0;
+  double speed_gain = 0.0;
+  double speed_filter_rad_s = 0.0;  ///< corner of the law's speed; 0: none
+  double limit = 0.0;
+  double supply_V = 0.0;
+  bool brakes_when_off = false;  ///< the winding is shorted while the power is off
+  KnownLoad load;
+
+  [[nodiscard]] std::size_t size() const noexcept { return angle_rad.size(); }
+};
+
+}  // namespace torsio

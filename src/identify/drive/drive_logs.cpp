@@ -1,0 +1,216 @@
+#include "identify/drive/drive_logs.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "data/channel_names.hpp"
+#include "data/names.hpp"
+#include "joint_load/load_fact.hpp"
+#include "numerics/quantile.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kFewestSamples = 20;
+
+const std::vector<double>& finite_channel(const Recording& recording, const std::string& name) {
+  const std::vector<double>& values = recording.channel(name).values;
+  const auto wrong =
+      std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
+  if (wrong == values.end()) return values;
+  const auto sample = static_cast<std::size_t>(wrong - values.begin());
+  throw Error({.place = fmt::format("{}, {}, t = {:.4g} s", recording.name(), name,
+                                    recording.time_s(sample)),
+               .expected = "a finite value, as a free run passes through every sample",
+               .found = fmt::format("{}", *wrong),
+               .advice = "Cut the recording there (from, to or split_at_gaps in a mapping)."});
+}
+
+std::string command_channel(const Recording& recording, const DriveSheet& drive) {
+  const std::vector<std::string> wanted =
+      drive.command.empty() ? command_channels(drive.law) : std::vector<std::string>{drive.command};
+  for (const std::string& channel : wanted)
+    if (recording.has(channel)) return channel;
+  throw Error(
+      {.place = recording.name(),
+       .expected = fmt::format("the command of the law '{}': {}", name(drive.law), joined(wanted)),
+       .found = "the channels " + joined(channel_names(recording.channels())),
+       .advice = "Name its channel as 'command' in the drive file, or map the column to it."});
+}
+
+/// 1 for the half of the samples in which the error changes least: goal, angle and duty are read one after the other, so
+/// that they do not belong together in a fast motion.
+std::vector<double> slow_samples(const std::vector<double>& goal,
+                                 const std::vector<double>& angle) {
+  std::vector<double> change(goal.size(), 0.0);
+  for (std::size_t n = 1; n + 1 < goal.size(); ++n)
+    change[n] =
+        std::max(std::abs(goal[n + 1] - goal[n - 1]), std::abs(angle[n + 1] - angle[n - 1]));
+  const double limit = quantile(change, 0.5);
+  for (double& value : change) value = value <= limit ? 1.0 : 0.0;
+  return change;
+}
+
+void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log) {
+  const auto fact = [&](const LoadFact& stated, std::string_view name) {
+    return fact_in(stated, recording, drive.file, name);
+  };
+  const auto positive = [&](const LoadFact& stated, std::string_view name) {
+    const double value = fact(stated, name);
+    if (value > 0.0) return value;
+    throw Error({.place = recording.name(),
+                 .expected = fmt::format("a {} above 0", name),
+                 .found = fmt::format("{:.6g}", value)});
+  };
+  const std::string channel = command_channel(recording, drive);
+  log.command = finite_channel(recording, channel);
+  log.brakes_when_off = drive.brakes_when_off;
+  switch (drive.law) {
+    case DriveLaw::position:
+      log.kind = CommandKind::goal_to_duty;
+      log.supply_V = positive(drive.supply_V, "supply");
+      log.gain = positive(drive.gain, "gain") * drive.error_gain_1_rad.value();
+      log.limit = drive.max_duty_1;
+      return;
+    case DriveLaw::pd:
+      log.kind = CommandKind::goal_to_torque;
+      log.gain = positive(drive.kp_Nm_rad, "kp");
+      log.speed_gain = fact(drive.kd_Nms_rad, "kd");
+      log.limit = positive(drive.torque_limit_Nm, "torque_limit");
+      log.speed_filter_rad_s = 2.0 * std::numbers::pi * drive.speed_filter_Hz;
+      return;
+    case DriveLaw::voltage:
+      log.kind = CommandKind::duty;
+      log.supply_V = positive(drive.supply_V, "supply");
+      if (channel.ends_with("_V"))
+        for (double& value : log.command) value /= log.supply_V;
+      return;
+    case DriveLaw::current: log.kind = CommandKind::current_A; return;
+    case DriveLaw::torque: log.kind = CommandKind::torque_Nm; return;
+  }
+}
+
+}  // namespace
+
+std::string angle_channel(const Recording& recording, const DriveSheet& drive) {
+  constexpr std::array<std::string_view, 3> kAngles{"motor_angle_rad", "gear_angle_rad",
+                                                    "joint_angle_rad"};
+  if (!drive.angle.empty()) return recording.channel(drive.angle).name;
+  for (const std::string_view angle : kAngles)
+    if (recording.has(angle)) return std::string(angle);
+  throw Error(
+      {.place = recording.name(),
+       .expected = "the angle of the motor or of the joint: motor_angle_rad, gear_angle_rad or "
+                   "joint_angle_rad",
+       .found = "the channels " + joined(channel_names(recording.channels())),
+       .advice = "Name its channel as 'angle' in the drive file, or map the column to it."});
+}
+
+DriveLog drive_log(const Recording& recording, const LoadSheet& load, const DriveSheet& drive) {
+  DriveLog log;
+  log.name = recording.name();
+  log.sample_period_s = 1.0 / recording.sample_rate_Hz();
+  if (recording.size() < kFewestSamples)
+    throw Error({.place = recording.name(),
+                 .expected = fmt::format("at least {} samples", kFewestSamples),
+                 .found = fmt::format("{}", recording.size())});
+  const std::string angle = angle_channel(recording, drive);
+  log.angle_rad = finite_channel(recording, angle);
+  if (angle == "motor_angle_rad" && drive.gear_ratio != 1.0)
+    for (double& value : log.angle_rad) value /= drive.gear_ratio;
+  set_law(recording, drive, log);
+  if (recording.has("enabled_1")) log.enabled = finite_channel(recording, "enabled_1");
+  log.load = known_load(load, recording);
+  return log;
+}
+
+MeasuredDrive measured_drive(const std::vector<Recording>& recordings, const DriveSheet& sheet) {
+  MeasuredDrive measured{.sheet = sheet, .error_gain = {}};
+  if (sheet.law != DriveLaw::position || sheet.error_gain_1_rad) return measured;
+  double product = 0.0;
+  double square = 0.0;
+  double duty_square = 0.0;
+  std::size_t samples = 0;
+  for (const Recording& recording : recordings) {
+    if (!recording.has("duty_1")) continue;
+    const std::vector<double>& duty = finite_channel(recording, "duty_1");
+    const std::vector<double>& goal = finite_channel(recording, command_channel(recording, sheet));
+    const std::vector<double>& angle = finite_channel(recording, angle_channel(recording, sheet));
+    const double gain = fact_in(sheet.gain, recording, sheet.file, "gain");
+    const std::vector<double> slow = slow_samples(goal, angle);
+    for (std::size_t n = 0; n < duty.size(); ++n) {
+      if (recording.has("enabled_1") && recording.channel("enabled_1").values[n] == 0.0) continue;
+      if (std::abs(duty[n]) > 0.95 * sheet.max_duty_1 || slow[n] == 0.0) continue;
+      const double error = gain * (goal[n] - angle[n]);
+      product += error * duty[n];
+      square += error * error;
+      duty_square += duty[n] * duty[n];
+      ++samples;
+    }
+  }
+  if (samples < kFewestSamples || square <= 0.0 || product <= 0.0)
+    throw Error({.place = sheet.file,
+                 .expected = "error_gain, the duty for an error of 1 rad at gain 1, or duty_1 in "
+                             "the recordings to measure "
+                             "it from",
+                 .found = samples == 0 ? "no recording with duty_1 below its limit"
+                                       : "a duty that does not follow the error",
+                 .advice = "State 'error_gain' in the drive file (--drive)."});
+  const double gain = product / square;
+  measured.sheet.error_gain_1_rad = gain;
+  const double rest = std::max(duty_square - gain * product, 0.0);
+  measured.error_gain = {gain, std::sqrt(rest / static_cast<double>(samples)), samples};
+  return measured;
+}
+
+namespace {
+
+std::string text_of(double value) { return fmt::format("{:.6g}", value); }
+
+/// Values of a condition by recording, nothing if one lacks it.
+std::vector<std::string> values_of(const std::vector<Recording>& recordings,
+                                   const std::string& condition) {
+  std::vector<std::string> values;
+  for (const Recording& recording : recordings) {
+    if (!recording.has(condition)) return {};
+    values.push_back(
+        fmt::format("{} {}", condition, text_of(recording.channel(condition).values.front())));
+  }
+  return values;
+}
+
+}  // namespace
+
+std::vector<std::string> drive_groups(const std::vector<Recording>& recordings,
+                                      const std::string& group_by) {
+  std::vector<std::string> own;
+  for (const Recording& recording : recordings) own.push_back(recording.name());
+  if (!group_by.empty() && group_by != "recording") {
+    std::vector<std::string> values = values_of(recordings, group_by);
+    if (!values.empty()) return values;
+    throw UsageError({.place = "--group-by " + group_by,
+                      .expected = "a condition that all recordings have, or 'recording'",
+                      .found = "recordings without it"});
+  }
+  constexpr std::size_t kManyRecordings = 6;
+  if (group_by == "recording" || recordings.size() <= kManyRecordings) return own;
+  std::vector<std::string> best = own;
+  std::size_t fewest = recordings.size();
+  for (const std::string& condition : recordings.front().conditions()) {
+    std::vector<std::string> values = values_of(recordings, condition);
+    const std::size_t count = std::set<std::string>(values.begin(), values.end()).size();
+    if (values.empty() || count < 3 || count >= fewest) continue;
+    fewest = count;
+    best = std::move(values);
+  }
+  return best;
+}
+
+}  // namespace torsio

@@ -1,0 +1,324 @@
+#include "identify/drive/drive_rollout.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+// Highway compiles this file once for each instruction set; the order of its headers matters.
+// clang-format off
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "identify/drive/drive_rollout.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+#include <hwy/contrib/math/math-inl.h>
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace torsio::drive_rollout::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<double, kDriveLanes>;
+using V = hn::Vec<D>;
+using Index = hn::RebindToSigned<D>;
+
+HWY_INLINE V constant(double value) { return hn::Set(D(), value); }
+HWY_INLINE V within(V value, V limit) { return hn::Min(hn::Max(value, hn::Neg(limit)), limit); }
+HWY_INLINE V decay(V speed, V inverse_speed) {  // exp(-|v| / v_s)
+  return hn::Exp(D(), hn::Max(hn::Neg(hn::Mul(hn::Abs(speed), inverse_speed)), constant(-700.0)));
+}
+// Highway's sine is exact up to some 2^27 pi.
+HWY_INLINE V sine(V angle) { return hn::Sin(D(), within(angle, constant(4e8))); }
+
+// The parameters of the lanes from `at` on.
+struct Constants {
+  Constants(const DriveLanes& lanes, std::size_t at) : lanes_(lanes), at_(at) {}
+  HWY_INLINE V operator()(DriveParameter parameter) const {
+    return hn::Load(D(), lanes_.of[static_cast<std::size_t>(parameter)].data() + at_);
+  }
+
+ private:
+  const DriveLanes& lanes_;
+  std::size_t at_;
+};
+
+// What is stepped through at once: a vector of lanes through a run.
+class Rollout {
+ public:
+  HWY_INLINE Rollout(const DriveLog& log, const DriveRun& run, const DriveLanes& lanes,
+                     std::size_t at, const RolloutOptions& options)
+      : log_(log), run_(run), of_(lanes, at), at_(at) {
+    using enum DriveTerm;
+    has_delay_ = has(options.terms, delay);
+    has_load_ = has(options.terms, load_friction);
+    has_load_stribeck_ = has(options.terms, load_stribeck);
+    has_stribeck_ = has(options.terms, stribeck);
+    has_rise_ = has(options.terms, resistance_rise);
+    has_exponent_ = has(options.terms, duty_exponent);
+    has_spring_ = has(options.terms, spring);
+    has_hysteresis_ = has(options.terms, hysteresis);
+    has_backlash_ = has(options.terms, backlash);
+    has_presliding_ = has(options.terms, presliding);
+    is_law_delayed_ = log.kind == CommandKind::goal_to_torque;
+    substeps_ = static_cast<std::size_t>(std::ceil(log.sample_period_s / options.step_s - 1e-6));
+    substeps_ = std::max<std::size_t>(substeps_, 1);
+    step_s_ = log.sample_period_s / static_cast<double>(substeps_);
+    gravity_ = constant(log.load.load.gravity_Nm);
+    zero_ = hn::Add(of_(DriveParameter::zero), constant(log.load.load.zero_rad));
+    const V load =
+        hn::Add(constant(log.load.load.inertia_kg_m2), of_(DriveParameter::joint_inertia));
+    const V moved =
+        has_spring_ ? of_(DriveParameter::armature) : hn::Add(load, of_(DriveParameter::armature));
+    inverse_inertia_ = hn::Div(constant(1.0), moved);
+    momentum_ = hn::Div(moved, constant(step_s_));
+    joint_inverse_inertia_ = hn::Div(constant(1.0), load);
+    joint_momentum_ = hn::Div(load, constant(step_s_));
+    inverse_load_speed_ = hn::Div(constant(1.0), of_(DriveParameter::load_speed));
+    inverse_stribeck_speed_ = hn::Div(constant(1.0), of_(DriveParameter::stribeck_speed));
+    if (has_hysteresis_)
+      inverse_width_ = hn::Div(constant(1.0), of_(DriveParameter::hysteresis_width));
+    if (has_presliding_)
+      inverse_presliding_ = hn::Div(constant(1.0), of_(DriveParameter::presliding));
+    const double corner = log.speed_filter_rad_s * step_s_;
+    speed_share_ = constant(log.speed_filter_rad_s > 0.0 ? 1.0 - std::exp(-corner) : 1.0);
+    angle_ = constant(run.angle_rad);
+    speed_ = constant(run.speed_rad_s);
+    filtered_speed_ = speed_;
+    joint_angle_ = has_spring_ ? hanging_joint() : angle_;
+    joint_speed_ = speed_;
+    std::fill(std::begin(ring_), std::end(ring_), 0.0);
+  }
+
+  HWY_INLINE void run(const RolloutOutput& output) {
+    for (std::size_t n = 0; n < run_.samples; ++n) {
+      store(angle_, output.angle_rad, n);
+      store(joint_angle_, output.joint_angle_rad, n);
+      if (n + 1 == run_.samples && output.joint_torque_Nm == nullptr) return;
+      is_on_ = log_.enabled.empty() || log_.enabled[run_.first + n] != 0.0;
+      for (std::size_t k = 0; k < substeps_; ++k) {
+        step(run_.first + n, static_cast<double>(k) / static_cast<double>(substeps_));
+        if (k == 0) store(joint_torque_, output.joint_torque_Nm, n);
+      }
+    }
+  }
+
+ private:
+  HWY_INLINE void store(V value, double* out, std::size_t sample) const {
+    if (out != nullptr) hn::Store(value, D(), out + sample * kDriveLanes + at_);
+  }
+
+  // The spring carries the load, as if it were at rest; without a start of the joint in the log that is the best guess.
+  HWY_INLINE V hanging_joint() const {
+    const V compliance = hn::Div(constant(1.0), of_(DriveParameter::stiffness));
+    V joint = angle_;
+    for (int k = 0; k < 8; ++k)
+      joint = hn::NegMulAdd(hn::Mul(gravity_, compliance), sine(hn::Add(joint, zero_)), angle_);
+    return joint;
+  }
+
+  // The command at a fraction of the period after a sample, between its stamps on straight lines.
+  HWY_INLINE V command(std::size_t sample, double fraction) const {
+    const double last = static_cast<double>(log_.size() - 1);
+    const double now = static_cast<double>(sample) + fraction;
+    if (!has_delay_ || is_law_delayed_) {
+      const double place = std::min(now, last);
+      const auto below = std::min(static_cast<std::size_t>(place), log_.size() - 2);
+      const double share = place - static_cast<double>(below);
+      return constant(log_.command[below] +
+                      share * (log_.command[below + 1] - log_.command[below]));
+    }
+    const V delayed = hn::NegMulAdd(of_(DriveParameter::delay),
+                                    constant(1.0 / log_.sample_period_s), constant(now));
+    const V place = hn::Min(hn::Max(delayed, hn::Zero(D())), constant(last - 1e-9));
+    const V below = hn::Floor(place);
+    const auto index = hn::ConvertTo(Index(), below);
+    const V left = hn::GatherIndex(D(), log_.command.data(), index);
+    const V right = hn::GatherIndex(D(), log_.command.data() + 1, index);
+    return hn::MulAdd(hn::Sub(place, below), hn::Sub(right, left), left);
+  }
+
+  HWY_INLINE V law_torque(V goal) {
+    filtered_speed_ = hn::MulAdd(speed_share_, hn::Sub(speed_, filtered_speed_), filtered_speed_);
+    V wanted = hn::Mul(constant(log_.gain), hn::Sub(goal, angle_));
+    wanted = hn::NegMulAdd(constant(log_.speed_gain), filtered_speed_, wanted);
+    wanted = within(wanted, constant(log_.limit));
+    return has_delay_ ? delayed(wanted) : wanted;
+  }
+
+  // `wanted` as it was one delay ago; from the ring of past values, between them on straight lines.
+  HWY_INLINE V delayed(V wanted) {
+    constexpr std::size_t kMask = kSlots - 1;
+    hn::Store(wanted, D(), ring_ + (newest_ & kMask) * hn::MaxLanes(D()));
+    const V age = hn::Mul(of_(DriveParameter::delay), constant(1.0 / step_s_));
+    const V steps = hn::Min(hn::Max(age, hn::Zero(D())), constant(static_cast<double>(kSlots - 2)));
+    const V whole = hn::Floor(steps);
+    const V newest = constant(static_cast<double>(newest_));
+    const auto slot = [&](V past) HWY_ATTR {
+      const Index tag;
+      const auto ring = hn::And(hn::ConvertTo(tag, hn::Sub(newest, past)), hn::Set(tag, kMask));
+      return hn::Add(hn::Mul(ring, hn::Set(tag, static_cast<std::int64_t>(hn::MaxLanes(D())))),
+                     hn::Iota(tag, 0));
+    };
+    const V recent = hn::GatherIndex(D(), ring_, slot(whole));
+    const V older = hn::GatherIndex(D(), ring_, slot(hn::Add(whole, constant(1.0))));
+    ++newest_;
+    return hn::MulAdd(hn::Sub(steps, whole), hn::Sub(older, recent), recent);
+  }
+
+  HWY_INLINE V winding_torque(V duty) {
+    if (!is_on_ && !log_.brakes_when_off) return hn::Zero(D());
+    if (!is_on_) duty = hn::Zero(D());
+    const V size = hn::Abs(duty);
+    if (has_exponent_) {
+      const V log_size = hn::Log(D(), hn::Max(size, constant(1e-9)));
+      duty =
+          hn::CopySign(hn::Exp(D(), hn::Mul(of_(DriveParameter::duty_exponent), log_size)), duty);
+    }
+    V resistance = of_(DriveParameter::resistance);
+    if (has_rise_)
+      resistance =
+          hn::MulAdd(of_(DriveParameter::resistance_rise), hn::Mul(size, size), resistance);
+    const V constant_Nm_A = of_(DriveParameter::torque_constant);
+    const V voltage = hn::NegMulAdd(constant_Nm_A, speed_, hn::Mul(constant(log_.supply_V), duty));
+    return hn::Mul(constant_Nm_A, hn::Div(voltage, resistance));
+  }
+
+  HWY_INLINE V motor_torque(std::size_t sample, double fraction) {
+    const V input = command(sample, fraction);
+    switch (log_.kind) {
+      case CommandKind::goal_to_duty:
+        return winding_torque(
+            within(hn::Mul(constant(log_.gain), hn::Sub(input, angle_)), constant(log_.limit)));
+      case CommandKind::duty: return winding_torque(input);
+      case CommandKind::goal_to_torque: {
+        const V torque = law_torque(input);
+        return is_on_ ? torque : hn::Zero(D());
+      }
+      case CommandKind::current_A:
+        return is_on_ ? hn::Mul(of_(DriveParameter::torque_constant), input) : hn::Zero(D());
+      case CommandKind::torque_Nm: return is_on_ ? input : hn::Zero(D());
+    }
+    return hn::Zero(D());
+  }
+
+  // What dry friction holds at most under a load.
+  HWY_INLINE V dry_friction(V load) const {
+    V friction = of_(DriveParameter::coulomb);
+    if (has_load_) friction = hn::MulAdd(of_(DriveParameter::load_friction), load, friction);
+    if (has_load_stribeck_)
+      friction = hn::MulAdd(hn::Mul(of_(DriveParameter::load_stribeck), load),
+                            decay(speed_, inverse_load_speed_), friction);
+    if (has_stribeck_)
+      friction = hn::MulAdd(of_(DriveParameter::stribeck), decay(speed_, inverse_stribeck_speed_),
+                            friction);
+    return friction;
+  }
+
+  // On the motor's side: what opposes `driving`, the sum of all other torques.
+  HWY_INLINE V friction_torque(V driving, V load) {
+    const V viscous = of_(DriveParameter::viscous);
+    if (has_presliding_) {
+      const V moved = hn::Mul(hn::Mul(hn::Abs(speed_), constant(step_s_)), inverse_presliding_);
+      const V kept = hn::Exp(D(), hn::Max(hn::Neg(moved), constant(-700.0)));
+      const V end = hn::CopySign(constant(1.0), speed_);
+      bristle_ = hn::MulAdd(hn::Sub(bristle_, end), kept, end);
+      return hn::MulAdd(dry_friction(load), bristle_, hn::Mul(viscous, speed_));
+    }
+    const V bound = hn::MulAdd(viscous, hn::Abs(speed_), dry_friction(load));
+    return within(hn::MulAdd(momentum_, speed_, driving), bound);
+  }
+
+  HWY_INLINE void step(std::size_t sample, double fraction) {
+    const V motor = motor_torque(sample, fraction);
+    const V dt = constant(step_s_);
+    if (has_spring_) return step_two(motor, dt);
+    const V gravity = hn::Neg(hn::Mul(gravity_, sine(hn::Add(angle_, zero_))));
+    const V one = constant(1.0);
+    const V direction = of_(DriveParameter::direction);
+    const V load = hn::Abs(hn::Sub(hn::Mul(motor, hn::Add(one, direction)),
+                                   hn::Mul(gravity, hn::Sub(one, direction))));
+    const V driving = hn::Add(motor, gravity);
+    const V friction = friction_torque(driving, load);
+    joint_torque_ = hn::Sub(motor, friction);
+    speed_ = hn::MulAdd(hn::Mul(dt, inverse_inertia_), hn::Sub(driving, friction), speed_);
+    angle_ = hn::MulAdd(dt, speed_, angle_);
+    joint_angle_ = angle_;
+  }
+
+  HWY_INLINE V spring_torque(V dt) {
+    V deflection = hn::Sub(angle_, joint_angle_);
+    if (has_backlash_)
+      deflection = hn::Sub(deflection, within(deflection, of_(DriveParameter::backlash)));
+    const V rate = hn::Sub(speed_, joint_speed_);
+    V torque = hn::MulAdd(of_(DriveParameter::stiffness), deflection,
+                          hn::Mul(of_(DriveParameter::spring_damping), rate));
+    if (has_hysteresis_) {
+      stop_ = within(hn::MulAdd(hn::Mul(rate, dt), inverse_width_, stop_), constant(1.0));
+      torque = hn::MulAdd(of_(DriveParameter::hysteresis), stop_, torque);
+    }
+    return torque;
+  }
+
+  HWY_INLINE void step_two(V motor, V dt) {
+    const V spring = spring_torque(dt);
+    joint_torque_ = spring;
+    const V driving = hn::Sub(motor, spring);
+    const V friction = friction_torque(driving, hn::Abs(spring));
+    const V gravity = hn::Mul(gravity_, sine(hn::Add(joint_angle_, zero_)));
+    const V on_joint = hn::Sub(spring, gravity);
+    const V bound = hn::MulAdd(of_(DriveParameter::bearing_viscous), hn::Abs(joint_speed_),
+                               of_(DriveParameter::bearing));
+    const V bearing = within(hn::MulAdd(joint_momentum_, joint_speed_, on_joint), bound);
+    speed_ = hn::MulAdd(hn::Mul(dt, inverse_inertia_), hn::Sub(driving, friction), speed_);
+    angle_ = hn::MulAdd(dt, speed_, angle_);
+    joint_speed_ =
+        hn::MulAdd(hn::Mul(dt, joint_inverse_inertia_), hn::Sub(on_joint, bearing), joint_speed_);
+    joint_angle_ = hn::MulAdd(dt, joint_speed_, joint_angle_);
+  }
+
+  static constexpr std::size_t kSlots =
+      128;  // a power of two, more than the longest delay in steps
+
+  const DriveLog& log_;
+  const DriveRun& run_;
+  Constants of_;
+  std::size_t at_;
+  bool has_delay_, has_load_, has_load_stribeck_, has_stribeck_, has_rise_, has_exponent_,
+      has_spring_;
+  bool has_hysteresis_, has_backlash_, has_presliding_, is_law_delayed_;
+  bool is_on_ = true;
+  std::size_t substeps_ = 1;
+  double step_s_ = 0.0;
+  V gravity_, zero_, inverse_inertia_, momentum_, joint_inverse_inertia_, joint_momentum_;
+  V inverse_load_speed_, inverse_stribeck_speed_;
+  V inverse_width_ = hn::Zero(D()), inverse_presliding_ = hn::Zero(D());
+  V speed_share_;
+  V angle_, speed_, filtered_speed_, joint_angle_, joint_speed_;
+  V bristle_ = hn::Zero(D()), stop_ = hn::Zero(D()), joint_torque_ = hn::Zero(D());
+  std::size_t newest_ = kSlots;
+  HWY_ALIGN double ring_[kSlots * hn::MaxLanes(D())];
+};
+
+void roll_out_lanes(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,
+                    const RolloutOptions& options, const RolloutOutput& output) {
+  for (std::size_t at = 0; at < kDriveLanes; at += hn::Lanes(D()))
+    Rollout(log, run, parameters, at, options).run(output);
+}
+
+}  // namespace torsio::drive_rollout::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace torsio {
+namespace drive_rollout {
+
+HWY_EXPORT(roll_out_lanes);
+
+}  // namespace drive_rollout
+
+void roll_out(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,
+              const RolloutOptions& options, const RolloutOutput& output) noexcept {
+  HWY_DYNAMIC_DISPATCH(drive_rollout::roll_out_lanes)(log, run, parameters, options, output);
+}
+
+}  // namespace torsio
+#endif

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "identify/drive/drive_log.hpp"
+#include "torsio/identify/drive/drive_model.hpp"
+
+namespace torsio {
+
+/// Sets of parameters that are simulated at once, one to a lane.
+inline constexpr std::size_t kDriveLanes = 16;
+struct alignas(64) DriveLanes {
+  std::array<std::array<double, kDriveLanes>, kDriveParameters> of;
+
+  void set(std::size_t lane, const DriveValues& values) {
+    for (std::size_t p = 0; p < kDriveParameters; ++p) of[p][lane] = values[p];
+  }
+};
+
+/// A free run through a part of a log.
+struct DriveRun {
+  std::size_t first = 0;  ///< sample
+  std::size_t samples = 0;
+  double angle_rad = 0.0;  ///< at the first sample
+  double speed_rad_s = 0.0;
+};
+
+struct RolloutOptions {
+  DriveTerms terms;       ///< terms that are computed at all
+  double step_s = 0.001;  ///< longest step of the integrator, a sample period at most
+};
+
+/// Where a rollout puts its values, [sample][lane]; null: not wanted.
+struct RolloutOutput {
+  double* angle_rad = nullptr;  ///< angle of the encoder that the log has
+  double* joint_angle_rad = nullptr;
+  double* joint_torque_Nm =
+      nullptr;  ///< on the joint: of the spring, or of the motor less friction
+};
+
+/// Free runs from the commands alone by the equations of `DriveParameter`, semi-implicit Euler; friction
+/// stops a motion and never reverses it. A run that leaves all bounds gives values that are not finite.
+void roll_out(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,
+              const RolloutOptions& options, const RolloutOutput& output) noexcept;
+
+}  // namespace torsio

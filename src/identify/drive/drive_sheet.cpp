@@ -1,0 +1,166 @@
+#include "torsio/identify/drive/drive_sheet.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+#include "core/quantity.hpp"
+#include "data/channel_names.hpp"
+#include "data/names.hpp"
+#include "data/yaml_reader.hpp"
+#include "joint_load/load_fact.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, DriveLaw>, 5> kLaws{
+    {{"position", DriveLaw::position},
+     {"pd", DriveLaw::pd},
+     {"voltage", DriveLaw::voltage},
+     {"current", DriveLaw::current},
+     {"torque", DriveLaw::torque}}};
+
+DriveLaw law_of(const YamlValue& value) {
+  const std::string text = value.text();
+  for (const auto& [law_name, law] : kLaws)
+    if (law_name == text) return law;
+  value.refuse("one of the laws position, pd, voltage, current, torque");
+}
+
+/// Keys of one law in addition to those of all.
+void require_keys(const YamlValue& drive, DriveLaw law) {
+  std::vector<std::string> keys{"law", "command", "angle", "gear_ratio"};
+  const auto with = [&](std::initializer_list<const char*> more) {
+    keys.insert(keys.end(), more.begin(), more.end());
+  };
+  if (law == DriveLaw::position) with({"gain", "error_gain", "supply", "max_duty", "off"});
+  if (law == DriveLaw::voltage) with({"supply", "off"});
+  if (law == DriveLaw::pd) with({"kp", "kd", "torque_limit", "filter"});
+  drive.allow_only(keys);
+}
+
+double positive(const YamlValue& value, std::string_view si_unit) {
+  const double number = quantity_with_unit(value.text(), si_unit, value.place());
+  if (!(number > 0.0)) value.refuse("a number above 0");
+  return number;
+}
+
+void read_position(const YamlValue& drive, DriveSheet& sheet) {
+  if (const auto gain = drive.find("gain")) sheet.gain = load_fact(*gain, "1");
+  const auto error_gain = drive.find("error_gain");
+  if (error_gain && error_gain->text() != "measured") {
+    const double value = error_gain->plain_number(1e6);
+    if (!(value > 0.0))
+      error_gain->refuse("the duty for an error of 1 rad at gain 1, above 0, or 'measured'");
+    sheet.error_gain_1_rad = value;
+  }
+  if (const auto limit = drive.find("max_duty")) {
+    sheet.max_duty_1 = limit->plain_number(1.0);
+    if (!(sheet.max_duty_1 > 0.0)) limit->refuse("a duty above 0, at most 1");
+  }
+}
+
+void read_winding(const YamlValue& drive, DriveSheet& sheet) {
+  sheet.supply_V = load_fact(drive.at("supply"), "V");
+  if (sheet.supply_V.condition.empty() && !(sheet.supply_V.value > 0.0))
+    drive.at("supply").refuse("a voltage above 0");
+  if (const auto off = drive.find("off")) {
+    const std::string text = off->text();
+    if (text != "open_circuit" && text != "short")
+      off->refuse("open_circuit or short: the winding while enabled_1 is 0");
+    sheet.brakes_when_off = text == "short";
+  }
+}
+
+void read_pd(const YamlValue& drive, DriveSheet& sheet) {
+  sheet.kp_Nm_rad = load_fact(drive.at("kp"), "Nm_rad");
+  if (const auto kd = drive.find("kd")) sheet.kd_Nms_rad = load_fact(*kd, "Nms_rad");
+  if (const auto limit = drive.find("torque_limit"))
+    sheet.torque_limit_Nm = load_fact(*limit, "Nm");
+  if (const auto filter = drive.find("filter")) sheet.speed_filter_Hz = positive(*filter, "Hz");
+}
+
+DriveSheet sheet_from(const YamlValue& root, const std::string& name) {
+  if (!root.is_map()) root.refuse("a map with the key drive");
+  const YamlValue drive = root.find("drive").value_or(root);
+  if (root.find("drive")) root.allow_only({"drive"});
+  if (!drive.is_map()) drive.refuse("a map with the key law");
+  DriveSheet sheet;
+  sheet.file = name;
+  sheet.law = law_of(drive.at("law"));
+  require_keys(drive, sheet.law);
+  if (const auto command = drive.find("command")) sheet.command = command->text();
+  if (const auto angle = drive.find("angle")) sheet.angle = angle->text();
+  if (const auto ratio = drive.find("gear_ratio")) {
+    sheet.gear_ratio = ratio->plain_number(1e5);
+    if (!(sheet.gear_ratio > 0.0)) ratio->refuse("a ratio above 0");
+  }
+  if (sheet.law == DriveLaw::position) read_position(drive, sheet);
+  if (sheet.law == DriveLaw::position || sheet.law == DriveLaw::voltage) read_winding(drive, sheet);
+  if (sheet.law == DriveLaw::pd) read_pd(drive, sheet);
+  return sheet;
+}
+
+}  // namespace
+
+std::string_view name(DriveLaw law) { return kLaws[static_cast<std::size_t>(law)].first; }
+
+std::vector<std::string> command_channels(DriveLaw law) {
+  switch (law) {
+    case DriveLaw::position:
+    case DriveLaw::pd: return {"goal_angle_rad"};
+    case DriveLaw::voltage: return {"drive_V", "duty_1"};
+    case DriveLaw::current: return {"motor_current_A"};
+    case DriveLaw::torque: return {"command_torque_Nm"};
+  }
+  return {};
+}
+
+DriveSheet parse_drive_sheet(std::string_view text, const std::string& name) {
+  return sheet_from(YamlValue::parse(text, name), name);
+}
+
+DriveSheet read_drive_sheet(const std::string& path) {
+  return sheet_from(YamlValue::read(path), path);
+}
+
+DriveSheet assumed_drive_sheet(const Recording& recording) {
+  const auto has = [&](std::string_view channel) { return recording.has(channel); };
+  DriveSheet sheet;
+  sheet.file = "no drive file";
+  if (has("goal_angle_rad") && has("kp_Nm_rad")) {
+    sheet.law = DriveLaw::pd;
+    sheet.kp_Nm_rad.condition = "kp_Nm_rad";
+    if (has("kd_Nms_rad")) sheet.kd_Nms_rad.condition = "kd_Nms_rad";
+    if (has("torque_limit_Nm")) sheet.torque_limit_Nm.condition = "torque_limit_Nm";
+    return sheet;
+  }
+  if (has("goal_angle_rad") && has("supply_V") && (has("duty_1"))) {
+    sheet.law = DriveLaw::position;
+    if (has("kp_1")) sheet.gain.condition = "kp_1";
+    sheet.supply_V.condition = "supply_V";
+    return sheet;
+  }
+  if (has("motor_current_A")) {
+    sheet.law = DriveLaw::current;
+    return sheet;
+  }
+  if (has("command_torque_Nm")) {
+    sheet.law = DriveLaw::torque;
+    return sheet;
+  }
+  throw Error(
+      {.place = recording.name(),
+       .expected = "channels that state the drive's law: goal_angle_rad, duty_1 and the condition "
+                   "supply_V; "
+                   "goal_angle_rad and the conditions kp_Nm_rad, kd_Nms_rad; motor_current_A; or "
+                   "command_torque_Nm",
+       .found = "the channels " + joined(channel_names(recording.channels())),
+       .advice = "State the law in a drive file: --drive drive.yaml (docs/use/identify.md)."});
+}
+
+}  // namespace torsio

@@ -1,0 +1,170 @@
+#include "torsio/identify/drive/identify_drive.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/aligned_vector.hpp"
+#include "core/report_progress.hpp"
+#include "identify/drive/choose_structure.hpp"
+#include "identify/drive/drive_checks.hpp"
+#include "identify/drive/drive_errors.hpp"
+#include "identify/drive/drive_fit.hpp"
+#include "identify/drive/drive_logs.hpp"
+#include "numerics/parallel.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+std::vector<DriveLog> logs_of(const std::vector<Recording>& recordings, const LoadSheet& load,
+                              const DriveSheet& drive, const std::string& group_by) {
+  const std::vector<std::string> groups = drive_groups(recordings, group_by);
+  std::vector<DriveLog> logs;
+  logs.reserve(recordings.size());
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    logs.push_back(drive_log(recordings[k], load, drive));
+    logs.back().group = groups[k];
+  }
+  return logs;
+}
+
+DriveTerms largest_terms(const IdentifyOptions& options, const LoadSheet& load, CommandKind kind) {
+  const DriveTerms wanted =
+      options.terms.value_or(options.largest.value_or(possible_terms(kind, false, false)));
+  const bool has_spring = has(wanted, DriveTerm::spring);
+  const DriveTerms possible = possible_terms(kind, has_spring, load.fits_joint_inertia);
+  const DriveTerms terms = (wanted | drive_terms({DriveTerm::base})) & possible;
+  const DriveTerms impossible = options.terms.value_or(DriveTerms()) & ~possible;
+  for (std::size_t k = 0; k < kDriveTerms; ++k)
+    if (impossible.test(k))
+      throw UsageError({.place = "--terms",
+                        .expected = "terms that the drive's law can have",
+                        .found = std::string(name(static_cast<DriveTerm>(k))),
+                        .advice = "resistance_rise and duty_exponent need a law of position or "
+                                  "voltage, hysteresis, backlash, "
+                                  "bearing and presliding need spring, joint_inertia needs spring "
+                                  "and 'joint_inertia: fit' in "
+                                  "the load file; direction is for a drive without spring."});
+  return terms;
+}
+
+void require_usable(const std::vector<DriveFinding>& findings) {
+  std::string text;
+  for (const DriveFinding& finding : findings)
+    if (finding.is_failure)
+      text += fmt::format("{}{}: {}", text.empty() ? "" : "\n  ", finding.subject, finding.text);
+  if (!text.empty())
+    throw Error({.place = "torsio identify",
+                 .problem = "the recordings do not determine a model\n  " + text});
+}
+
+void set_nested(const GroupedLogs& all, const DriveTerms& largest, const DriveFitOptions& options,
+                std::size_t threads, DriveIdentification& identified) {
+  // The groups that remain choose the structure among themselves, so that there must be two of them.
+  if (all.groups < 3) return;
+  std::vector<std::vector<double>> scores(all.groups);
+  for_each_chunk(all.groups, threads, [&](std::size_t left_out) {
+    const GroupedLogs rest = all.subset_without(left_out);
+    const ChosenStructure chosen = choose_structure(rest, largest, options, 1);
+    const DriveSolution fit = fit_drive(rest.logs, chosen.held_out.terms, options);
+    for (std::size_t k = 0; k < all.logs.size(); ++k)
+      if (all.group[k] == left_out)
+        scores[left_out].push_back(
+            score_drive(drive_problem({all.logs[k]}, chosen.held_out.terms, options), fit.values)
+                .mae_rad);
+  });
+  identified.nested_mae_rad = 0.0;
+  std::vector<std::size_t> next(all.groups, 0);
+  for (std::size_t k = 0; k < all.logs.size(); ++k) {
+    const std::size_t group = all.group[k];
+    identified.recordings[k].nested_mae_rad = scores[group][next[group]++];
+    identified.nested_mae_rad +=
+        identified.recordings[k].nested_mae_rad / static_cast<double>(all.logs.size());
+  }
+}
+
+void set_held_out(const HeldOutStructure& held_out, DriveIdentification& identified) {
+  identified.held_out_mae_rad = held_out.mae_rad;
+  for (std::size_t k = 0; k < identified.recordings.size(); ++k)
+    identified.recordings[k].held_out_mae_rad = held_out.mae_of_log_rad[k];
+}
+
+}  // namespace
+
+DriveIdentification identify_drive(const std::vector<Recording>& recordings, const LoadSheet& load,
+                                   const DriveSheet& drive, const IdentifyOptions& options) {
+  if (recordings.empty())
+    throw UsageError({.place = "torsio identify", .expected = "recordings", .found = "none"});
+  const MeasuredDrive measured = measured_drive(recordings, drive);
+  const std::vector<DriveLog> logs = logs_of(recordings, load, measured.sheet, options.group_by);
+  DriveIdentification identified;
+  identified.drive = measured.sheet;
+  identified.load = load;
+  identified.error_gain = measured.error_gain;
+  identified.findings = check_drive_logs(recordings, logs);
+  require_usable(identified.findings);
+  const DriveFitOptions fit{.starts = options.starts,
+                            .seed = options.seed,
+                            .step_s = options.step_s,
+                            .progress = options.progress};
+  const DriveTerms largest = largest_terms(options, load, logs.front().kind);
+  DriveLogs pointers;
+  for (const DriveLog& log : logs) pointers.push_back(&log);
+  const GroupedLogs all = grouped(pointers);
+  identified.groups = all.groups;
+  identified.terms = largest;
+  identified.recordings.resize(logs.size());
+  if (all.groups > 1) {
+    report_progress(options.progress, 0.0, "structure");
+    if (options.terms) {
+      set_held_out(hold_out(all, largest, fit, options.threads), identified);
+    } else {
+      ChosenStructure chosen = choose_structure(all, largest, fit, options.threads);
+      identified.terms = chosen.held_out.terms;
+      identified.trials = std::move(chosen.trials);
+      set_held_out(chosen.held_out, identified);
+      if (options.has_nested_score) set_nested(all, largest, fit, options.threads, identified);
+    }
+  }
+  identified.step_s = drive_step_s(identified.terms, fit);
+  const DriveSolution solution = fit_drive(pointers, identified.terms, fit);
+  identified.values = solution.values;
+  const DriveScore score =
+      score_drive(drive_problem(pointers, identified.terms, fit), solution.values);
+  identified.mae_rad = score.mae_rad;
+  identified.rmse_rad = score.rmse_rad;
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    identified.recordings[k].recording = logs[k].name;
+    identified.recordings[k].group = logs[k].group;
+    identified.recordings[k].mae_rad = score.mae_of_log_rad[k];
+  }
+  report_progress(options.progress, 0.5, "standard errors");
+  identified.parameters = parameters_with_errors(logs, identified.terms, solution.values,
+                                                 options.has_standard_errors, fit, options.threads);
+  for (DriveFinding& finding : check_identified(logs, identified))
+    identified.findings.push_back(std::move(finding));
+  return identified;
+}
+
+DriveTrace simulate_drive(const DriveIdentification& identified, const Recording& recording) {
+  const DriveLog log = drive_log(recording, identified.load, identified.drive);
+  DriveLanes lanes{};
+  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, identified.values);
+  detail::AlignedVector<double> angle(log.size() * kDriveLanes);
+  detail::AlignedVector<double> joint(log.size() * kDriveLanes);
+  detail::AlignedVector<double> torque(log.size() * kDriveLanes);
+  roll_out(log, run_from(log, 0, log.size()), lanes, {identified.terms, identified.step_s},
+           {angle.data(), joint.data(), torque.data()});
+  DriveTrace trace{.sample_rate_Hz = recording.sample_rate_Hz(), .measured_rad = log.angle_rad};
+  for (std::size_t n = 0; n < log.size(); ++n) {
+    trace.angle_rad.push_back(angle[n * kDriveLanes]);
+    trace.joint_angle_rad.push_back(joint[n * kDriveLanes]);
+    trace.joint_torque_Nm.push_back(torque[n * kDriveLanes]);
+  }
+  return trace;
+}
+
+}  // namespace torsio

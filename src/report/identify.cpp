@@ -1,0 +1,156 @@
+#include "report/identify.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "report/json_text.hpp"
+#include "report/result_parts.hpp"
+#include "torsio/report/text_table.hpp"
+
+namespace torsio {
+namespace {
+
+using DriveJson = nlohmann::ordered_json;
+
+const DriveParameterInfo& info_of(const IdentifiedDriveParameter& parameter) {
+  return drive_parameters()[static_cast<std::size_t>(parameter.parameter)];
+}
+
+std::string number_or_dash(double value) {
+  return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-";
+}
+std::string angle_text(double value_rad) {
+  return std::isfinite(value_rad) ? fmt::format("{:.4f}", value_rad) : "-";
+}
+
+std::string parameter_table(const DriveIdentification& identified) {
+  TextTable table;
+  table.header({"parameter", "value", "standard error", "95 % interval", "what it is"});
+  for (const IdentifiedDriveParameter& parameter : identified.parameters) {
+    const DriveParameterInfo& info = info_of(parameter);
+    std::string note(info.meaning);
+    if (parameter.is_at_bound) note += " (at its bound)";
+    if (!parameter.is_determined) note += " (not determined)";
+    table.row({std::string(info.name), number_or_dash(parameter.value),
+               number_or_dash(parameter.standard_error),
+               std::isfinite(parameter.lowest)
+                   ? fmt::format("{:.4g} to {:.4g}", parameter.lowest, parameter.highest)
+                   : "-",
+               note});
+  }
+  return table.text();
+}
+
+std::string score_table(const DriveIdentification& identified) {
+  TextTable table;
+  table.header({"recording", "group", "fitted [rad]", "held out [rad]", "nested [rad]"});
+  for (const DriveRecordingScore& score : identified.recordings)
+    table.row({score.recording, score.group, angle_text(score.mae_rad),
+               angle_text(score.held_out_mae_rad), angle_text(score.nested_mae_rad)});
+  table.row({"mean", "", angle_text(identified.mae_rad), angle_text(identified.held_out_mae_rad),
+             angle_text(identified.nested_mae_rad)});
+  return table.text();
+}
+
+std::string structure_text(const DriveIdentification& identified) {
+  if (identified.trials.empty())
+    return fmt::format("terms beyond the base: {} (stated)\n", terms_text(identified.terms));
+  std::string steps;
+  for (const StructureTrial& trial : identified.trials)
+    if (trial.is_taken)
+      steps += fmt::format("{}{} {:.4f}", steps.empty() ? "" : ", ", trial.change, trial.mae_rad);
+  return fmt::format("terms beyond the base: {} (chosen by held-out error in rad: {})\n",
+                     terms_text(identified.terms), steps);
+}
+
+}  // namespace
+
+std::string terms_text(const DriveTerms& terms) {
+  std::string text;
+  for (std::size_t k = 1; k < kDriveTerms; ++k)
+    if (terms.test(k))
+      text += fmt::format("{}{}", text.empty() ? "" : ", ", name(static_cast<DriveTerm>(k)));
+  return text.empty() ? "none" : text;
+}
+
+std::string identification_text(const DriveIdentification& identified) {
+  std::string text;
+  for (const DriveFinding& finding : identified.findings)
+    text += fmt::format("{} {}: {}\n", finding.is_failure ? "FAIL" : "WARN", finding.subject,
+                        finding.text);
+  if (!text.empty()) text += "\n";
+  text += parameter_table(identified) + "\n" + score_table(identified);
+  text +=
+      "mean |measured - simulated angle| in free runs from the command alone. held out: fitted "
+      "without the recording's "
+      "group;\nnested: the terms were chosen without it, too. Of these three only the last one "
+      "chose nothing by what it "
+      "scores.\n\n";
+  text += structure_text(identified);
+  if (identified.error_gain)
+    text += fmt::format(
+        "error_gain measured from the duty: {:.5g} for 1 rad at gain 1, residual {:.2g} (RMS of "
+        "the duty)\n",
+        identified.error_gain->value_1_rad, identified.error_gain->residual_duty_1);
+  if (!identified.parameters.empty() && std::isfinite(identified.parameters.front().standard_error))
+    text += fmt::format(
+        "standard errors: from fits without one recording each ({} recordings, Student's t), and "
+        "from the "
+        "uncertainty of the load.\nThey do not contain what is wrong in all recordings alike, such "
+        "as the "
+        "stated supply.\n",
+        identified.recordings.size());
+  return text;
+}
+
+std::string identification_json(const DriveIdentification& identified) {
+  DriveJson parameters = DriveJson::array();
+  for (const IdentifiedDriveParameter& parameter : identified.parameters)
+    parameters.push_back({{"name", info_of(parameter).name},
+                          {"value", json_number(parameter.value)},
+                          {"standard_error", json_number(parameter.standard_error)},
+                          {"lowest_95", json_number(parameter.lowest)},
+                          {"highest_95", json_number(parameter.highest)},
+                          {"standard_error_from_load", json_number(parameter.from_load)},
+                          {"is_determined", parameter.is_determined},
+                          {"is_at_bound", parameter.is_at_bound}});
+  DriveJson recordings = DriveJson::array();
+  for (const DriveRecordingScore& score : identified.recordings)
+    recordings.push_back({{"recording", score.recording},
+                          {"group", score.group},
+                          {"mae_rad", json_number(score.mae_rad)},
+                          {"held_out_mae_rad", json_number(score.held_out_mae_rad)},
+                          {"nested_mae_rad", json_number(score.nested_mae_rad)}});
+  DriveJson trials = DriveJson::array();
+  for (const StructureTrial& trial : identified.trials)
+    trials.push_back({{"terms", terms_text(trial.terms)},
+                      {"change", trial.change},
+                      {"held_out_mae_rad", json_number(trial.mae_rad)},
+                      {"difference_standard_error_rad", json_number(trial.gain_error_rad)},
+                      {"is_taken", trial.is_taken}});
+  DriveJson findings = DriveJson::array();
+  for (const DriveFinding& finding : identified.findings)
+    findings.push_back({{"status", finding.is_failure ? "FAIL" : "WARN"},
+                        {"subject", finding.subject},
+                        {"text", finding.text}});
+  DriveJson document{{"law", name(identified.drive.law)},
+                     {"terms", terms_text(identified.terms)},
+                     {"step_s", identified.step_s},
+                     {"mae_rad", json_number(identified.mae_rad)},
+                     {"rmse_rad", json_number(identified.rmse_rad)},
+                     {"held_out_mae_rad", json_number(identified.held_out_mae_rad)},
+                     {"nested_mae_rad", json_number(identified.nested_mae_rad)},
+                     {"groups", identified.groups},
+                     {"parameters", std::move(parameters)},
+                     {"recordings", std::move(recordings)},
+                     {"structures", std::move(trials)},
+                     {"findings", std::move(findings)}};
+  if (identified.error_gain)
+    document["error_gain"] = {{"value_1_rad", identified.error_gain->value_1_rad},
+                              {"residual_duty_1", identified.error_gain->residual_duty_1},
+                              {"samples", identified.error_gain->samples}};
+  return json_text(document);
+}
+
+}  // namespace torsio
