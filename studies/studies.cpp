@@ -121,6 +121,8 @@ constexpr std::array kStudies{
     StudyInfo{"few-data", "ours",
               "A base model on a new joint after 10 s, in one size and across sizes",
               few_data_transfer, 2.0},
+    StudyInfo{"known-load", "ours", "A spring learned from a known load instead of a torque sensor",
+              known_load_study, 2.0},
     StudyInfo{"arm-external", "ours",
               "The error of an arm's external torque with learned springs and straight lines",
               arm_external, 7.0},

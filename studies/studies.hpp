@@ -43,6 +43,7 @@ Study sensitivity_004(const StudyOptions& options, const Progress& progress);
 Study arm_external(const StudyOptions& options, const Progress& progress);
 Study arm_contacts(const StudyOptions& options, const Progress& progress);
 Study arm_collision(const StudyOptions& options, const Progress& progress);
+Study known_load_study(const StudyOptions& options, const Progress& progress);
 Study few_data_transfer(const StudyOptions& options, const Progress& progress);
 Study model_comparison(const StudyOptions& options, const Progress& progress);
 Study public_benchmarks(const StudyOptions& options, const Progress& progress);

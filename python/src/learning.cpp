@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "evaluate/compared_target.hpp"
 #include "report/cross_validation.hpp"
 #include "report/drift.hpp"
 #include "report/transfer.hpp"
@@ -63,8 +64,10 @@ Model fit(const Dataset& dataset, const std::string& family,
 }
 
 /// Recordings of any role for a model of this target.
-Dataset for_model(Dataset dataset, const Model& model, std::optional<Role> role) {
-  dataset.target = model.file->settings.target;
+/// @param target with which it is compared; empty: its own
+Dataset for_model(Dataset dataset, const Model& model, std::optional<Role> role,
+                  const std::string& target = {}) {
+  dataset.target = compared_target(*model.file, target);
   if (role)
     for (DatasetRecord& record : dataset.records)
       record.segments = whole_record(record.recording.size(), *role);
@@ -72,9 +75,10 @@ Dataset for_model(Dataset dataset, const Model& model, std::optional<Role> role)
   return dataset;
 }
 
-std::string evaluate(const Model& model, const Dataset& dataset) {
+std::string evaluate(const Model& model, const Dataset& dataset, const std::string& target) {
   return interruptible([&](const Progress& progress) {
-    return results_json(evaluate_model(*model.file, for_model(dataset, model, {}), progress));
+    return results_json(
+        evaluate_model(*model.file, for_model(dataset, model, {}, target), progress));
   });
 }
 
@@ -176,7 +180,7 @@ void bind_learning(py::module_& module) {
   module.def("check", check, py::arg("dataset"), py::arg("inputs"), py::arg("advise"));
   module.def("fit", fit, py::arg("dataset"), py::arg("family"), py::arg("options"),
              py::arg("inputs"), py::arg("seed"), py::arg("allow_leak"), py::arg("serial"));
-  module.def("evaluate", evaluate, py::arg("model"), py::arg("dataset"));
+  module.def("evaluate", evaluate, py::arg("model"), py::arg("dataset"), py::arg("target"));
   module.def("compare", compare, py::arg("dataset"), py::arg("models"), py::arg("inputs"),
              py::arg("seed"), py::arg("allow_leak"));
   module.def("crossvalidate", crossvalidate, py::arg("dataset"), py::arg("models"),

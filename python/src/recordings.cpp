@@ -7,6 +7,9 @@
 #include "torsio/data/load.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/data/write.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/common/load_target.hpp"
+#include "torsio/joint_load/known_load.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::python {
@@ -150,11 +153,36 @@ void add_to(Dataset& dataset, const py::handle& item, Role role, const LoadOptio
   }
 }
 
+/// How the target is computed, if it is.
+struct TargetSource {
+  std::optional<LoadSheet> load = {};
+  LoadTarget before = {};  ///< how that of a model was computed
+};
+
+TargetSource target_source(const py::object& load, const py::object& model) {
+  TargetSource source;
+  if (load.is_none()) return source;
+  source.load = py::isinstance<LoadSheet>(load) ? load.cast<const LoadSheet&>()
+                                                : read_load_sheet(path_text(load));
+  if (!model.is_none()) source.before = model.cast<const Model&>().file->card.load_target;
+  return source;
+}
+
+void compute_target(Dataset& dataset, const TargetSource& source) {
+  const LoadSheet& sheet = *source.load;
+  // The inputs are those of a spring, whose agreement under several loads shows what is fitted.
+  const FeatureSpec features =
+      sheet.fits_joint_inertia || sheet.fits_zero ? resolve_inputs(dataset, {}) : FeatureSpec{};
+  add_load_target(dataset, sheet, features, source.before);
+}
+
 Dataset dataset_of(const Roles& roles, const std::string& target, const py::object& mapping,
-                   std::optional<double> rate_Hz, std::optional<std::size_t> initialise_samples) {
+                   std::optional<double> rate_Hz, std::optional<std::size_t> initialise_samples,
+                   const TargetSource& source) {
   LoadOptions options;
   options.rate_Hz = rate_Hz;
   options.target = target;
+  options.computes_target = source.load.has_value();
   if (!mapping.is_none()) options.mapping = path_text(mapping);
   Dataset dataset;
   if (!target.empty()) dataset.target = target;
@@ -167,6 +195,7 @@ Dataset dataset_of(const Roles& roles, const std::string& target, const py::obje
                       .expected = "at least one recording",
                       .found = "none",
                       .advice = "Dataset(train=[...], test=[...])"});
+  if (source.load) compute_target(dataset, source);
   dataset.check();
   return dataset;
 }
@@ -300,10 +329,40 @@ void bind_recording(py::module_& module) {
                       [](const py::tuple& state) { return recording_unpickled(state); }));
 }
 
+/// Gravity, inertia and zero of a load in a recording, and what one standard error of each fact changes in them.
+py::dict load_in(const LoadSheet& sheet, const Recording& recording) {
+  const KnownLoad known = known_load(sheet, recording);
+  const auto numbers = [](const JointLoad& load) {
+    return py::dict(py::arg("gravity_Nm") = load.gravity_Nm,
+                    py::arg("inertia_kg_m2") = load.inertia_kg_m2,
+                    py::arg("zero_rad") = load.zero_rad);
+  };
+  py::dict found = numbers(known.load);
+  py::dict errors;
+  for (const LoadError& error : known.errors) errors[py::str(error.fact)] = numbers(error.change);
+  found["errors"] = errors;
+  return found;
+}
+
+void bind_load(py::module_& module) {
+  py::class_<LoadSheet>(module, "Load",
+                        "The known load of a joint: a pendulum, or a joint of a URDF with its "
+                        "payload (docs/use/known_load.md). Made by `read_load`.")
+      .def_property_readonly("file", [](const LoadSheet& self) { return self.file; })
+      .def("of", load_in, py::arg("recording"),
+           "gravity_Nm, inertia_kg_m2 and zero_rad in a recording, and in `errors` what one "
+           "standard error of each fact changes in them.")
+      .def("__repr__", [](const LoadSheet& self) { return "<Load of '" + self.file + "'>"; });
+  module.def(
+      "read_load", [](const py::object& path) { return read_load_sheet(path_text(path)); },
+      py::arg("path"), "Reads a load file (.yaml).");
+}
+
 }  // namespace
 
 void bind_recordings(py::module_& module) {
   bind_recording(module);
+  bind_load(module);
   module.def("recordings_from_columns", recordings_from_columns, py::arg("columns"),
              py::arg("rate_Hz"), py::arg("mapping"), py::arg("name"));
   module.def(
@@ -354,15 +413,27 @@ void bind_recordings(py::module_& module) {
       "Each argument is a Recording, the path of a log or of a manifest, or a list of these.")
       .def(py::init([](py::object train, py::object test, py::object validation,
                        const std::string& target, const py::object& mapping,
-                       std::optional<double> rate_Hz,
-                       std::optional<std::size_t> initialise_samples) {
+                       std::optional<double> rate_Hz, std::optional<std::size_t> initialise_samples,
+                       const py::object& load, const py::object& fitted_by) {
              return dataset_of({std::move(train), std::move(validation), std::move(test)}, target,
-                               mapping, rate_Hz, initialise_samples);
+                               mapping, rate_Hz, initialise_samples,
+                               target_source(load, fitted_by));
            }),
            py::arg("train") = py::none(), py::arg("test") = py::none(),
            py::arg("validation") = py::none(), py::kw_only(), py::arg("target") = "",
            py::arg("mapping") = py::none(), py::arg("rate_Hz") = py::none(),
-           py::arg("initialise_samples") = py::none())
+           py::arg("initialise_samples") = py::none(), py::arg("load") = py::none(),
+           py::arg("fitted_by") = py::none(),
+           "load: the target is the torque of this known load, a `Load` or the path of a load file "
+           "(docs/use/known_load.md).\n"
+           "fitted_by: a model, whose facts of the load are taken where the file fits them.")
+      .def_property_readonly(
+          "load_notes",
+          [](const Dataset& self) {
+            return self.load_target.is_used() ? load_target_notes(self.load_target)
+                                              : std::vector<std::string>{};
+          },
+          "How the torque of a known load was computed, and its errors, in sentences.")
       .def_property_readonly("target", [](const Dataset& self) { return self.target; })
       .def_property_readonly("sample_rate_Hz", &Dataset::sample_rate_Hz)
       .def_property_readonly("roles", roles_of, "(name, role) of each recording.")

@@ -23,6 +23,7 @@ from ._core import (
     Error,
     Estimate,
     Estimator,
+    Load,
     Model,
     Recording,
     UsageError,
@@ -30,6 +31,7 @@ from ._core import (
     families,
     load,
     read,
+    read_load,
     simulate,
     sweep_dataset,
 )
@@ -59,7 +61,7 @@ setattr(Recording, "to_pandas", recording_to_pandas)
 
 __version__ = _core.__version__
 
-for _type in (Arm, ArmSimulation, Batch, Dataset, Estimate, Estimator, Model, Recording):
+for _type in (Arm, ArmSimulation, Batch, Dataset, Estimate, Estimator, Load, Model, Recording):
     _type.__module__ = "torsio"
 del _type
 
@@ -79,6 +81,7 @@ __all__ = [
     "Fault",
     "Finding",
     "FoldSummary",
+    "Load",
     "Margins",
     "Model",
     "Recording",
@@ -99,6 +102,7 @@ __all__ = [
     "margins",
     "plot",
     "read",
+    "read_load",
     "simulate",
     "sweep_dataset",
     "track",

@@ -7,19 +7,27 @@ from os import PathLike
 from typing import Any, Union
 
 from . import _core
-from ._core import Dataset, Model, Recording
+from ._core import Dataset, Load, Model, Recording, UsageError
 from ._results import CheckReport, Comparison, CrossValidation, Document, Margins, Results
 
 #: A dataset, or recordings (of the role that the function needs), or paths of logs or manifests.
 Data = Union[Dataset, Recording, str, "PathLike[str]", Sequence[Any]]
 
 
-def _dataset(data: Data, role: str, target: str = "") -> Dataset:
+#: A load file or its path (docs/use/known_load.md).
+KnownLoad = Union[Load, str, "PathLike[str]"]
+
+
+def _dataset(
+    data: Data, role: str, target: str = "", load: KnownLoad | None = None, fitted_by: Model | None = None
+) -> Dataset:
     if isinstance(data, Dataset):
+        if load is not None:
+            raise UsageError("load: a Dataset has its target already; give the load to it, Dataset(..., load=...)")
         return data
     if role == "train":
-        return Dataset(train=data, target=target)
-    return Dataset(test=data, target=target)
+        return Dataset(train=data, target=target, load=load)
+    return Dataset(test=data, target=target, load=load, fitted_by=fitted_by)
 
 
 def _inputs(inputs: str | Sequence[str] | None) -> list[str]:
@@ -32,12 +40,19 @@ def _option(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def check(data: Data, *, inputs: str | Sequence[str] | None = None, advise: bool = False) -> CheckReport:
+def check(
+    data: Data,
+    *,
+    inputs: str | Sequence[str] | None = None,
+    advise: bool = False,
+    load: KnownLoad | None = None,
+) -> CheckReport:
     """Looks for errors in recordings before a fit: clock, units, signs, delay, range, ... (docs/use/check.md).
 
     advise: also propose which recording to make next, in `report.document["advice"]`.
+    load: the target is the torque of this known load (docs/use/known_load.md).
     """
-    return CheckReport.from_json(_core.check(_dataset(data, "train"), _inputs(inputs), advise))
+    return CheckReport.from_json(_core.check(_dataset(data, "train", load=load), _inputs(inputs), advise))
 
 
 def fit(
@@ -48,22 +63,31 @@ def fit(
     seed: int = 1,
     allow_leak: bool = False,
     serial: str = "",
+    load: KnownLoad | None = None,
     **options: Any,
 ) -> Model:
     """Trains one model on the recordings with the role train; equal arguments give equal models.
 
     inputs: expressions of channels (docs/use/expressions.md); without them, the deflection of the spring, its
     rate and the speed of the joint, as far as they are there.
+    load: the target is the torque of this known load instead of that of a sensor (docs/use/known_load.md).
     options: those of the family (`torsio.families()`), as layers="64", branch=True.
     Ctrl-C stops it.
     """
     given = {name: _option(value) for name, value in options.items()}
-    return _core.fit(_dataset(data, "train"), family, given, _inputs(inputs), seed, allow_leak, serial)
+    return _core.fit(_dataset(data, "train", load=load), family, given, _inputs(inputs), seed, allow_leak, serial)
 
 
-def evaluate(model: Model, data: Data) -> Results:
-    """Scores a model in free run on every role of the data; recordings without a role are tests."""
-    return Results.from_json(_core.evaluate(model, _dataset(data, "test", model.target)))
+def evaluate(
+    model: Model, data: Data, *, target: str | None = None, load: KnownLoad | None = None
+) -> Results:
+    """Scores a model in free run on every role of the data; recordings without a role are tests.
+
+    target: channel to compare with, in the unit of the model's target, which is the default.
+    load: compare with the torque of this known load (docs/use/known_load.md).
+    """
+    wanted = model.target if target is None else target
+    return Results.from_json(_core.evaluate(model, _dataset(data, "test", wanted, load, model), wanted))
 
 
 def compare(

@@ -15,7 +15,7 @@ using test::verdict_of;
 
 constexpr const char* kCheck = "known load";
 
-/// The bench with a torque that is said to be that of two levers.
+/// The bench with the torque of two known levers.
 Dataset loaded_bench() {
   Dataset dataset = bench_dataset();
   dataset.load_target = {

@@ -127,6 +127,26 @@ TEST(FigureCurves, GiveTheRmsOfTheSamplesInEachBandOfAChirp) {
   EXPECT_TRUE(std::isnan(bands[2].second));
 }
 
+TEST(KnownLoadStudy, LearnsABetterSpringThanALateSensorAndContainsItsErrors) {
+  const Study study = run_study(find_study("known-load"), kShort);
+  const auto& table = std::get<QuantityTable>(study.table);
+  for (const char* const test :
+       {"sweep, new lever, tilted", "chirp, locked", "random walk, locked"}) {
+    const std::string condition = std::string("dfki-50, ") + test;
+    const auto rmse_Nm = [&](const char* name) {
+      return row_of(table, condition, std::string("RMSE, ") + name).value;
+    };
+    EXPECT_LT(rmse_Nm("known load"), rmse_Nm("sensor")) << test;
+    EXPECT_LT(rmse_Nm("known load"), 0.1) << test;
+    const QuantityRow& wrong = row_of(table, condition, "RMSE, known load, these three wrong");
+    EXPECT_GT(wrong.value, rmse_Nm("known load")) << test;
+    // "error bar 0.3 Nm, ..": each fact is one standard error wrong, all in the direction of more torque.
+    const double bar_Nm = std::stod(wrong.remark.substr(std::string("error bar ").size()));
+    EXPECT_GT(2.0 * bar_Nm, wrong.value) << test;
+    EXPECT_LT(bar_Nm, 4.0 * wrong.value) << test;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(OfAll, ShortStudies,
                          testing::Values("001-inverse", "001-figures", "002-design", "002-slow",
                                          "002-algorithm", "002-selection", "002-figures",

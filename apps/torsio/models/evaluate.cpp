@@ -8,10 +8,10 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "common/report_text.hpp"
+#include "evaluate/compared_target.hpp"
 #include "report/html/model_report.hpp"
 #include "report/model_description.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
@@ -48,18 +48,6 @@ torsio::Recording prediction_recording(const torsio::ScoredRun& run) {
   result.add(std::move(std_dev));
   result.add(std::move(fault));
   return result;
-}
-
-/// The channel of `--target` as it is named inside torsio. @throws UsageError unless it is of the model's quantity.
-std::string target_for(const torsio::ModelFile& file, const std::string& wanted) {
-  const auto name = torsio::split_channel_name(wanted);
-  const auto own = torsio::split_channel_name(file.settings.target);
-  if (!name || !own || name->unit->si_suffix != own->unit->si_suffix)
-    throw torsio::UsageError(
-        {.place = "--target " + wanted,
-         .expected = "a channel in the unit of the model's target, " + file.settings.target,
-         .found = name ? "one in " + std::string(name->unit->si_suffix) : "a name without a unit"});
-  return name->si();
 }
 
 /// Without recordings they would be ignored.
@@ -101,7 +89,7 @@ void run(EvaluateFlags& flags) {
   }
   DataFlags data = flags.data;
   data.use_model(file, flags.model);
-  if (!flags.data.target.empty()) data.target = target_for(file, flags.data.target);
+  if (!flags.data.target.empty()) data.target = torsio::compared_target(file, flags.data.target);
   ProgressBar progress;
   torsio::Dataset dataset = data.load_as_test(progress.listener());
   data.compute_target(dataset, file.settings.features, file.card.load_target);
