@@ -1,0 +1,200 @@
+#include "identify/drive/drive_rollout.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace torsio {
+namespace {
+
+using enum DriveParameter;
+
+DriveLog test_log(CommandKind kind) {
+  DriveLog log;
+  log.kind = kind;
+  log.sample_period_s = 0.005;
+  log.gain = kind == CommandKind::goal_to_torque ? 60.0 : 0.6;
+  log.speed_gain = 2.0;
+  log.limit = kind == CommandKind::goal_to_torque ? 20.0 : 1.0;
+  log.supply_V = 24.0;
+  log.load.load = {.gravity_Nm = 4.0, .inertia_kg_m2 = 0.3, .zero_rad = 0.05};
+  for (int n = 0; n < 400; ++n) {
+    log.command.push_back(0.6 * std::sin(0.02 * n) + 0.2 * std::sin(0.11 * n));
+    log.angle_rad.push_back(0.0);
+    log.enabled.push_back(n >= 250 && n < 300 ? 0.0 : 1.0);
+  }
+  return log;
+}
+
+DriveValues test_values() {
+  DriveValues values = neutral_drive_values();
+  at(values, torque_constant) = 2.0;
+  at(values, resistance) = 3.0;
+  at(values, armature) = 0.05;
+  at(values, zero) = -0.02;
+  at(values, coulomb) = 0.2;
+  at(values, viscous) = 0.1;
+  at(values, delay) = 0.0065;
+  at(values, load_friction) = 0.05;
+  at(values, load_stribeck) = 0.04;
+  at(values, load_speed) = 0.3;
+  at(values, stribeck) = 0.1;
+  at(values, stribeck_speed) = 0.2;
+  at(values, resistance_rise) = 0.7;
+  at(values, duty_exponent) = 0.85;
+  at(values, direction) = 0.2;
+  at(values, stiffness) = 300.0;
+  at(values, spring_damping) = 0.4;
+  at(values, bearing) = 0.1;
+  at(values, bearing_viscous) = 0.05;
+  return values;
+}
+
+double command_at(const DriveLog& log, double place) {
+  place = std::clamp(place, 0.0, static_cast<double>(log.size() - 1));
+  const auto below = std::min(static_cast<std::size_t>(place), log.size() - 2);
+  return log.command[below] +
+         (place - static_cast<double>(below)) * (log.command[below + 1] - log.command[below]);
+}
+
+/// The equations of `DriveParameter` with one mass, in scalar code.
+std::vector<double> one_mass(const DriveLog& log, const DriveValues& p, double angle) {
+  constexpr int kSteps = 5;
+  const double dt = log.sample_period_s / kSteps;
+  const double inertia = log.load.load.inertia_kg_m2 + at(p, armature);
+  double speed = 0.0;
+  std::vector<double> angles;
+  for (std::size_t n = 0; n < log.size(); ++n) {
+    angles.push_back(angle);
+    for (int k = 0; k < kSteps; ++k) {
+      const double place = static_cast<double>(n) + static_cast<double>(k) / kSteps -
+                           at(p, delay) / log.sample_period_s;
+      double d = std::clamp(log.gain * (command_at(log, place) - angle), -log.limit, log.limit);
+      const double size = std::abs(d);
+      d = std::copysign(std::pow(size, at(p, duty_exponent)), d);
+      const double r = at(p, resistance) + at(p, resistance_rise) * size * size;
+      const double motor = log.enabled[n] * at(p, torque_constant) *
+                           (log.supply_V * d - at(p, torque_constant) * speed) / r;
+      const double gravity =
+          -log.load.load.gravity_Nm * std::sin(angle + log.load.load.zero_rad + at(p, zero));
+      const double load =
+          std::abs(motor * (1.0 + at(p, direction)) - gravity * (1.0 - at(p, direction)));
+      const double bound =
+          at(p, coulomb) + at(p, load_friction) * load +
+          at(p, load_stribeck) * load * std::exp(-std::abs(speed) / at(p, load_speed)) +
+          at(p, stribeck) * std::exp(-std::abs(speed) / at(p, stribeck_speed)) +
+          at(p, viscous) * std::abs(speed);
+      const double friction = std::clamp(inertia / dt * speed + motor + gravity, -bound, bound);
+      speed += dt / inertia * (motor + gravity - friction);
+      angle += dt * speed;
+    }
+  }
+  return angles;
+}
+
+std::vector<double> kernel_angles(const DriveLog& log, const DriveValues& values,
+                                  const DriveTerms& terms, std::size_t lane) {
+  DriveLanes lanes{};
+  for (std::size_t k = 0; k < kDriveLanes; ++k) {
+    DriveValues other = values;
+    at(other, coulomb) *= k == lane ? 1.0 : 1.5;
+    lanes.set(k, other);
+  }
+  std::vector<double> all(log.size() * kDriveLanes + 8);
+  double* aligned = all.data();
+  while (reinterpret_cast<std::uintptr_t>(aligned) % 64 != 0) ++aligned;
+  roll_out(log, {.first = 0, .samples = log.size(), .angle_rad = 0.1}, lanes, {terms, 0.001},
+           {.angle_rad = aligned});
+  std::vector<double> one;
+  for (std::size_t n = 0; n < log.size(); ++n) one.push_back(aligned[n * kDriveLanes + lane]);
+  return one;
+}
+
+TEST(DriveRollouts, AreThoseOfTheEquationsInEachLane) {
+  const DriveLog log = test_log(CommandKind::goal_to_duty);
+  const std::vector<double> wanted = one_mass(log, test_values(), 0.1);
+  DriveTerms terms = DriveTerms().set();
+  for (const DriveTerm term : {DriveTerm::spring, DriveTerm::hysteresis, DriveTerm::backlash,
+                               DriveTerm::bearing, DriveTerm::presliding, DriveTerm::joint_inertia})
+    terms.reset(static_cast<std::size_t>(term));
+  for (const std::size_t lane : {std::size_t{0}, std::size_t{7}, kDriveLanes - 1}) {
+    const std::vector<double> found = kernel_angles(log, test_values(), terms, lane);
+    for (std::size_t n = 0; n < log.size(); ++n) ASSERT_NEAR(found[n], wanted[n], 1e-9) << n;
+  }
+}
+
+TEST(DriveRollouts, KeepTheEnergyOfAnElasticPendulumWithoutFriction) {
+  DriveLog log = test_log(CommandKind::torque_Nm);
+  for (double& value : log.command) value = 0.0;
+  DriveValues values = test_values();
+  for (const DriveParameter none : {coulomb, viscous, load_friction, load_stribeck, stribeck,
+                                    spring_damping, bearing, bearing_viscous, zero})
+    at(values, none) = 0.0;
+  log.load.load.zero_rad = 0.0;
+  log.load.load.gravity_Nm = 0.0;
+  const DriveTerms terms = drive_terms({DriveTerm::base, DriveTerm::spring});
+  DriveLanes lanes{};
+  for (std::size_t k = 0; k < kDriveLanes; ++k) lanes.set(k, values);
+  std::vector<double> motor(log.size() * kDriveLanes + 8);
+  double* aligned = motor.data();
+  while (reinterpret_cast<std::uintptr_t>(aligned) % 64 != 0) ++aligned;
+  // Without gravity both masses move on at the speed that they had.
+  roll_out(log, {.first = 0, .samples = log.size(), .angle_rad = 0.0, .speed_rad_s = 1.0}, lanes,
+           {terms, 0.001}, {.angle_rad = aligned});
+  const double duration = log.sample_period_s * static_cast<double>(log.size() - 1);
+  EXPECT_NEAR(aligned[(log.size() - 1) * kDriveLanes], duration, 1e-9);
+}
+
+TEST(DriveRollouts, OfTwoMassesHaveTheResonanceOfTheSpring) {
+  DriveLog log = test_log(CommandKind::torque_Nm);
+  log.sample_period_s = 0.001;
+  log.command.assign(4000, 0.0);
+  log.angle_rad.assign(4000, 0.0);
+  log.enabled.clear();
+  for (int n = 0; n < 20; ++n) log.command[n] = 10.0;  // a blow
+  log.load.load = {.gravity_Nm = 0.0, .inertia_kg_m2 = 0.3, .zero_rad = 0.0};
+  DriveValues values = neutral_drive_values();
+  at(values, armature) = 0.1;
+  at(values, stiffness) = 300.0;
+  DriveLanes lanes{};
+  for (std::size_t k = 0; k < kDriveLanes; ++k) lanes.set(k, values);
+  std::vector<double> torque(log.size() * kDriveLanes + 8);
+  double* aligned = torque.data();
+  while (reinterpret_cast<std::uintptr_t>(aligned) % 64 != 0) ++aligned;
+  roll_out(log, {.first = 0, .samples = log.size()}, lanes,
+           {drive_terms({DriveTerm::base, DriveTerm::spring}), 0.001},
+           {.joint_torque_Nm = aligned});
+  int crossings = 0;
+  std::size_t first = 0;
+  std::size_t last = 0;
+  for (std::size_t n = 100; n + 1 < log.size(); ++n)
+    if (aligned[n * kDriveLanes] < 0.0 && aligned[(n + 1) * kDriveLanes] >= 0.0) {
+      if (crossings++ == 0) first = n;
+      last = n;
+    }
+  ASSERT_GT(crossings, 10);
+  const double frequency_Hz = (crossings - 1) / (0.001 * static_cast<double>(last - first));
+  const double wanted_Hz = std::sqrt(300.0 * (1.0 / 0.1 + 1.0 / 0.3)) / (2.0 * M_PI);
+  EXPECT_NEAR(frequency_Hz, wanted_Hz, 0.01 * wanted_Hz);
+}
+
+TEST(DriveRollouts, OfALawDelayItsTorque) {
+  const DriveLog log = test_log(CommandKind::goal_to_torque);
+  DriveValues values = test_values();
+  at(values, delay) = 0.0;
+  const DriveTerms with = drive_terms({DriveTerm::base, DriveTerm::delay});
+  const DriveTerms without = drive_terms({DriveTerm::base});
+  EXPECT_EQ(kernel_angles(log, values, with, 0), kernel_angles(log, values, without, 0));
+  at(values, delay) = 0.01;
+  const std::vector<double> late = kernel_angles(log, values, with, 0);
+  // Ten steps of a millisecond pass before the first torque of the law acts.
+  const std::vector<double> now = kernel_angles(log, values, without, 0);
+  EXPECT_NE(late, now);
+  for (const double angle : late) EXPECT_TRUE(std::isfinite(angle));
+}
+
+}  // namespace
+}  // namespace torsio
