@@ -104,7 +104,18 @@ std::string identification_text(const DriveIdentification& identified) {
   return text;
 }
 
-std::string identification_json(const DriveIdentification& identified) {
+std::string drive_advice_text(const std::vector<DriveAdvice>& advice) {
+  TextTable table;
+  table.header({"next recording", "lowers the standard error of", "to"});
+  for (const DriveAdvice& row : advice)
+    table.row({row.recording,
+               std::string(drive_parameters()[static_cast<std::size_t>(row.parameter)].name),
+               fmt::format("{:.0f} %", 100.0 * row.standard_error_ratio)});
+  return table.text();
+}
+
+std::string identification_json(const DriveIdentification& identified,
+                                const std::vector<DriveAdvice>& advice) {
   DriveJson parameters = DriveJson::array();
   for (const IdentifiedDriveParameter& parameter : identified.parameters)
     parameters.push_back({{"name", info_of(parameter).name},
@@ -150,6 +161,11 @@ std::string identification_json(const DriveIdentification& identified) {
     document["error_gain"] = {{"value_1_rad", identified.error_gain->value_1_rad},
                               {"residual_duty_1", identified.error_gain->residual_duty_1},
                               {"samples", identified.error_gain->samples}};
+  for (const DriveAdvice& row : advice)
+    document["advice"].push_back(
+        {{"recording", row.recording},
+         {"parameter", drive_parameters()[static_cast<std::size_t>(row.parameter)].name},
+         {"standard_error_ratio", row.standard_error_ratio}});
   return json_text(document);
 }
 

@@ -138,8 +138,10 @@ void run(DriveIdentifyFlags& flags) {
   for (const auto& [target, file] : flags.written)
     written.push_back(torsio::write_drive(torsio::drive_target(target), identified, recordings,
                                           flags.name, options));
-  if (flags.json.wants_tables()) print(torsio::identification_text(identified));
-  const std::string document = torsio::identification_json(identified);
+  const std::vector<torsio::DriveAdvice> advice = torsio::advise_drive(identified, recordings);
+  if (flags.json.wants_tables())
+    print(torsio::identification_text(identified) + "\n" + torsio::drive_advice_text(advice));
+  const std::string document = torsio::identification_json(identified, advice);
   flags.json.write(document);
   for (std::size_t k = 0; k < written.size(); ++k) {
     write_text(flags.written[k].second, written[k].text);

@@ -297,4 +297,16 @@ DriveScore score_drive(const DriveProblem& problem, const DriveValues& values) {
   return score;
 }
 
+std::vector<double> drive_information(const DriveProblem& problem, const DriveValues& values) {
+  constexpr double kQuadratic_rad = 1e6;  // the loss is that of least squares
+  Evaluation evaluation(problem, {.window_s = 0.0, .huber_rad = kQuadratic_rad});
+  evaluation.linearise(values, 0.01);
+  std::vector<double> rows;
+  const auto count = static_cast<Eigen::Index>(problem.searched.size());
+  for (Eigen::Index i = 0; i < count; ++i)
+    for (Eigen::Index j = 0; j < count; ++j)
+      rows.push_back(evaluation.matrix(i, j) * static_cast<double>(problem.logs.size()));
+  return rows;
+}
+
 }  // namespace torsio

@@ -66,6 +66,11 @@ struct DriveScore {
                                            std::span<const DriveValues> candidates,
                                            const DriveCost& cost);
 
+/// Second derivatives of half the sum over the logs of the mean squared error of the angle, at `values`, in the scale of
+/// the search: row by row.
+[[nodiscard]] std::vector<double> drive_information(const DriveProblem& problem,
+                                                    const DriveValues& values);
+
 /// Where a free run starts: a parabola through the angles within 30 ms.
 [[nodiscard]] DriveRun run_from(const DriveLog& log, std::size_t first, std::size_t samples);
 

@@ -132,6 +132,24 @@ TEST(IdentifyDrive, RemarksOnWhatTheRecordingsLack) {
   EXPECT_TRUE(std::isnan(found.parameters.front().standard_error));
 }
 
+TEST(IdentifyDrive, AdvisesAReleaseWhereNoRecordingWasPassive) {
+  const Servo servo;
+  std::vector<Recording> recordings;
+  for (unsigned seed = 1; seed < 4; ++seed)
+    recordings.push_back(servo_recording(servo, 100.0 * seed, 0.6, 0.3, false, seed));
+  const DriveIdentification found =
+      identify_drive(recordings, pendulum(), assumed_drive_sheet(recordings.front()),
+                     {.terms = kBaseAndDelay, .starts = 1, .has_standard_errors = false});
+  const std::vector<DriveAdvice> advice = advise_drive(found, recordings);
+  ASSERT_EQ(advice.size(), 4U);
+  EXPECT_THAT(advice.front().recording, HasSubstr("released"));
+  for (const DriveAdvice& row : advice) {
+    EXPECT_GT(row.standard_error_ratio, 0.0);
+    EXPECT_LT(row.standard_error_ratio, 1.0);
+  }
+  EXPECT_LT(advice.front().standard_error_ratio, 0.5 * advice.back().standard_error_ratio);
+}
+
 TEST(IdentifyDrive, RefusesWhatDoesNotDetermineTheTorque) {
   const std::vector<Recording> good = servo_recordings({});
   const DriveSheet drive = assumed_drive_sheet(good.front());

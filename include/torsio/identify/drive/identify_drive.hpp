@@ -107,6 +107,19 @@ struct DriveIdentification {
                                                  const LoadSheet& load, const DriveSheet& drive,
                                                  const IdentifyOptions& options = {});
 
+/// A recording to make next, and the parameter whose standard error it lowers most.
+struct DriveAdvice {
+  std::string recording;  ///< "the mass released with the power off, 3 s"
+  DriveParameter parameter{};
+  double standard_error = kNotMeasured;  ///< before; NaN: not known
+  double standard_error_ratio = 1.0;     ///< after it over before
+};
+
+/// Candidates by how much they lower one standard error: a passive release, a second mass, a gain between those that were
+/// used, a repeat. Each is simulated with the identified drive; its derivatives are added to those of the recordings.
+[[nodiscard]] std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
+                                                    const std::vector<Recording>& recordings);
+
 /// The identified drive through a recording, from its command alone.
 struct DriveTrace {
   double sample_rate_Hz = 0.0;

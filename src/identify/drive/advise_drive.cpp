@@ -1,0 +1,141 @@
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/aligned_vector.hpp"
+#include "identify/drive/drive_fit.hpp"
+#include "identify/drive/drive_logs.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/identify/drive/identify_drive.hpp"
+
+namespace torsio {
+namespace {
+
+struct CandidateLog {
+  std::string text;
+  DriveLog log;
+};
+
+/// The identified drive's angle becomes that of the log, from `start` on.
+DriveLog simulated(DriveLog log, const DriveIdentification& identified, const DriveRun& start) {
+  DriveLanes lanes{};
+  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, identified.values);
+  detail::AlignedVector<double> angles(log.size() * kDriveLanes);
+  roll_out(log, start, lanes, {identified.terms, identified.step_s}, {.angle_rad = angles.data()});
+  for (std::size_t n = 0; n < log.size(); ++n) log.angle_rad[n] = angles[n * kDriveLanes];
+  return log;
+}
+
+CandidateLog release(const DriveLog& like, const DriveIdentification& identified) {
+  constexpr double kDuration_s = 3.0;
+  constexpr double kFrom_rad = 1.5;
+  DriveLog log = like;
+  const auto samples = static_cast<std::size_t>(kDuration_s / log.sample_period_s);
+  log.command.assign(samples, 0.0);
+  log.angle_rad.assign(samples, 0.0);
+  log.enabled.assign(samples, 0.0);
+  return {fmt::format("the mass released at {:.0f} deg from hanging, power off, {:g} s",
+                      deg_from_rad(kFrom_rad), kDuration_s),
+          simulated(log, identified, {0, samples, kFrom_rad - log.load.load.zero_rad, 0.0})};
+}
+
+DriveRun start_of(const DriveLog& log) { return run_from(log, 0, log.size()); }
+
+CandidateLog second_mass(const DriveLog& like, const DriveIdentification& identified) {
+  DriveLog log = like;
+  log.load.load.gravity_Nm *= 2.0;
+  log.load.load.inertia_kg_m2 *= 2.0;
+  return {fmt::format("the motion of {} with twice the mass", like.name),
+          simulated(log, identified, start_of(log))};
+}
+
+std::optional<CandidateLog> gain_between(const std::vector<DriveLog>& logs,
+                                         const DriveIdentification& identified) {
+  std::vector<double> gains;
+  for (const DriveLog& log : logs) gains.push_back(log.gain);
+  std::ranges::sort(gains);
+  double widest = 1.2;
+  double gain = 0.0;
+  for (std::size_t k = 0; k + 1 < gains.size(); ++k)
+    if (gains[k] > 0.0 && gains[k + 1] / gains[k] > widest) {
+      widest = gains[k + 1] / gains[k];
+      gain = std::sqrt(gains[k] * gains[k + 1]);
+    }
+  if (gain == 0.0) return std::nullopt;
+  const auto nearest = std::ranges::min_element(
+      logs, {}, [&](const DriveLog& log) { return std::abs(log.gain - gain); });
+  DriveLog log = *nearest;
+  const double factor = gain / log.gain;
+  log.gain = gain;
+  return CandidateLog{
+      fmt::format("the motion of {} with {:.2f} times its gain", nearest->name, factor),
+      simulated(log, identified, start_of(log))};
+}
+
+Eigen::MatrixXd matrix_of(const DriveLogs& logs, const DriveIdentification& identified,
+                          const DriveFitOptions& options) {
+  const DriveProblem problem = drive_problem(logs, identified.terms, options);
+  const std::vector<double> rows = drive_information(problem, identified.values);
+  const auto count = static_cast<Eigen::Index>(problem.searched.size());
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      rows.data(), count, count);
+}
+
+}  // namespace
+
+std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
+                                      const std::vector<Recording>& recordings) {
+  std::vector<DriveLog> logs;
+  logs.reserve(recordings.size());
+  for (const Recording& recording : recordings)
+    logs.push_back(drive_log(recording, identified.load, identified.drive));
+  DriveLogs all;
+  for (const DriveLog& log : logs) all.push_back(&log);
+  const DriveFitOptions options{.step_s = identified.step_s};
+  Eigen::MatrixXd before = matrix_of(all, identified, options);
+  // What no recording moves has a finite variance all the same.
+  before.diagonal().array() += 1e-9 * std::max(before.diagonal().maxCoeff(), 1e-300);
+  const Eigen::VectorXd variance = before.inverse().diagonal();
+
+  // The recording that moves the parameters most is the one to vary.
+  std::size_t strongest = 0;
+  double most = 0.0;
+  std::vector<Eigen::MatrixXd> own;
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    own.push_back(matrix_of({&logs[k]}, identified, options));
+    const double gain = (before.inverse() * own.back()).trace();
+    if (gain > most) {
+      most = gain;
+      strongest = k;
+    }
+  }
+  std::vector<std::pair<std::string, Eigen::MatrixXd>> candidates;
+  candidates.emplace_back(fmt::format("{} once more", logs[strongest].name), own[strongest]);
+  const auto add = [&](const CandidateLog& candidate) {
+    candidates.emplace_back(candidate.text, matrix_of({&candidate.log}, identified, options));
+  };
+  add(release(logs[strongest], identified));
+  add(second_mass(logs[strongest], identified));
+  if (const auto between = gain_between(logs, identified)) add(*between);
+
+  std::vector<DriveAdvice> advice;
+  for (const auto& [text, matrix] : candidates) {
+    if (!matrix.allFinite()) continue;
+    const Eigen::VectorXd after = (before + matrix).inverse().diagonal();
+    Eigen::Index best = 0;
+    const double ratio = (after.array() / variance.array()).minCoeff(&best);
+    const IdentifiedDriveParameter& parameter =
+        identified.parameters[static_cast<std::size_t>(best)];
+    advice.push_back(
+        {text, parameter.parameter, parameter.standard_error, std::sqrt(std::max(ratio, 0.0))});
+  }
+  std::ranges::stable_sort(advice, {}, &DriveAdvice::standard_error_ratio);
+  return advice;
+}
+
+}  // namespace torsio
