@@ -32,9 +32,12 @@ struct SimulateFlags {
   std::string output;
   std::string duration;
   std::string lever;
+  std::string mass;
   std::string inclination;
   std::string amplitude;
   std::string frequency;
+  std::string lowest;
+  std::string highest;
   std::string impedance = "high";
   std::string faults;
   std::string temperature;
@@ -153,18 +156,21 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags, const torsio:
                               .seed = flags.seed,
                               .is_electrical = flags.is_electrical,
                               .with_truth = flags.with_truth};
-  if (!flags.duration.empty())
-    spec.duration_s = torsio::si_quantity(flags.duration, "s", "--duration");
-  if (!flags.lever.empty()) spec.lever_m = torsio::si_quantity(flags.lever, "m", "--lever");
-  if (!flags.inclination.empty())
-    spec.inclination_rad = torsio::si_quantity(flags.inclination, "rad", "--inclination");
+  const auto set = [](auto& value, const std::string& text, const char* unit, const char* flag) {
+    if (!text.empty()) value = torsio::si_quantity(text, unit, flag);
+  };
+  set(spec.duration_s, flags.duration, "s", "--duration");
+  set(spec.lever_m, flags.lever, "m", "--lever");
+  set(spec.mass_kg, flags.mass, "kg", "--mass");
+  set(spec.inclination_rad, flags.inclination, "rad", "--inclination");
+  set(spec.frequency_Hz, flags.frequency, "Hz", "--frequency");
+  set(spec.lowest_frequency_Hz, flags.lowest, "Hz", "--lowest");
+  set(spec.highest_frequency_Hz, flags.highest, "Hz", "--highest");
   if (!flags.amplitude.empty()) {
     const std::string_view unit = amplitude_unit(flags, sheet);
     (unit == "rad" ? spec.angle_amplitude_rad : spec.torque_amplitude_Nm) =
         torsio::si_quantity(flags.amplitude, unit, "--amplitude");
   }
-  if (!flags.frequency.empty())
-    spec.frequency_Hz = torsio::si_quantity(flags.frequency, "Hz", "--frequency");
   spec.is_impedance_zero = flags.impedance == "zero";
   spec.conditions = conditions(flags);
   if (!flags.faults.empty())
@@ -222,10 +228,13 @@ Json recording_json(const SimulateFlags& flags, const torsio::ExperimentSpec& sp
                 {"seed", flags.seed},
                 {"duration_s", static_cast<double>(recording.size()) / recording.sample_rate_Hz()},
                 {"lever_m", optional(spec.lever_m)},
+                {"mass_kg", optional(spec.mass_kg)},
                 {"inclination_rad", spec.inclination_rad},
                 {"torque_amplitude_Nm", optional(spec.torque_amplitude_Nm)},
                 {"angle_amplitude_rad", optional(spec.angle_amplitude_rad)},
                 {"frequency_Hz", optional(spec.frequency_Hz)},
+                {"lowest_frequency_Hz", optional(spec.lowest_frequency_Hz)},
+                {"highest_frequency_Hz", optional(spec.highest_frequency_Hz)},
                 {"impedance", flags.impedance},
                 {"electrical", spec.is_electrical},
                 {"conditions",
@@ -330,11 +339,16 @@ void add_simulate(CLI::App& app) {
                   torsio::kRecordingEndings));
   verb->add_option("--duration", flags->duration,
                    "length of the recording (default: that of the protocol)");
-  verb->add_option("--lever", flags->lever, "distance of the 9 kg mass from the joint axis: 0.17m");
+  verb->add_option("--lever", flags->lever, "distance of the mass from the joint axis: 0.17m");
+  verb->add_option("--mass", flags->mass, "mass on the lever (default 9kg; elastomer: 1kg)");
   verb->add_option("--inclination", flags->inclination,
                    "angle between the lever's plane of motion and the vertical: 37.8deg");
   verb->add_option("--amplitude", flags->amplitude, "amplitude of the excitation: 20Nm or 9deg");
   verb->add_option("--frequency", flags->frequency, "frequency of the excitation: 0.4Hz");
+  verb->add_option("--lowest", flags->lowest,
+                   "lowest frequency of an experiment in the air (default 0.1Hz)");
+  verb->add_option("--highest", flags->highest,
+                   "highest frequency of an experiment in the air (default 8Hz)");
   verb->add_option("--impedance", flags->impedance,
                    "impedance of the joint's controller: high or zero")
       ->check(CLI::IsMember({"high", "zero"}))

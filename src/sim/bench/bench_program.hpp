@@ -1,16 +1,26 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <functional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "sim/plant/plant.hpp"
 #include "sim/sensors/sensor_set.hpp"
 
 namespace torsio {
 
+/// A controller of a bench has at most so many commands that are logged.
+inline constexpr std::size_t kMaxCommands = 2;
+using BenchCommands = std::array<double, kMaxCommands>;
+
 /// What the bench does to the plant until the next tick.
 struct BenchAction {
   PlantCommand command;
   Load load;
+  BenchCommands commanded = {};  ///< values of `BenchProgram::command_channels`, in their order
 };
 
 /// The torque at the load cell.
@@ -26,6 +36,10 @@ struct BenchProgram {
   double start_angle_rad = 0.0;  ///< start angle of the joint
   LoadCell load_cell = LoadCell::joint;
   double duration_s = 0.0;
+  /// What the controller is asked for, and what it asks for, as channels of the log; at most `kMaxCommands`.
+  std::vector<std::string> command_channels = {};
+  /// Numbers of the whole run that a reader of the log needs: names with unit, values.
+  std::vector<std::pair<std::string, double>> log_conditions = {};
   std::function<BenchAction(const Measurement&)> next;
 };
 

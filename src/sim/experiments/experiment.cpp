@@ -7,7 +7,9 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/checks.hpp"
@@ -25,6 +27,20 @@ namespace {
 
 constexpr double kLongest_s = 36000.0;
 constexpr double kLowest_Hz = 0.001;  // a thousand seconds a period
+constexpr double kHighestOfBand_Hz = 20.0;
+constexpr double kHeaviest_kg = 100.0;
+
+void check_band(const ExperimentSpec& spec, const ExperimentEntry& entry) {
+  for (const auto& [value, option] : {std::pair{spec.lowest_frequency_Hz, "lowest"},
+                                      std::pair{spec.highest_frequency_Hz, "highest"}}) {
+    if (!value) continue;
+    const std::string place = fmt::format("{} {}", entry.info.name, option);
+    require<UsageError>(entry.has_band, place, "none: this experiment has no band of frequencies",
+                        as_text(*value));
+    require<UsageError>(*value >= kLowest_Hz && *value <= kHighestOfBand_Hz, place,
+                        fmt::format("{} to {} Hz", kLowest_Hz, kHighestOfBand_Hz), as_text(*value));
+  }
+}
 
 void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataSheet& sheet) {
   const auto require_option = [&](bool holds, const char* option, const std::string& expected,
@@ -43,6 +59,13 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
     require_option(*spec.lever_m > 0.0 && *spec.lever_m <= 2.0, "lever", "0 < metres <= 2",
                    as_text(*spec.lever_m));
   }
+  if (spec.mass_kg) {
+    require_option(entry.has_lever, "mass", "none: this experiment has no lever",
+                   as_text(*spec.mass_kg));
+    require_option(*spec.mass_kg > 0.0 && *spec.mass_kg <= kHeaviest_kg, "mass",
+                   fmt::format("0 < kg <= {}", kHeaviest_kg), as_text(*spec.mass_kg));
+  }
+  check_band(spec, entry);
   const double inclination_deg = deg_from_rad(spec.inclination_rad);
   require_option(entry.has_lever || spec.inclination_rad == 0.0, "inclination",
                  "none: this experiment has no lever", as_text(inclination_deg));
@@ -109,18 +132,22 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
   const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kBenchRate_Hz));
   const std::vector<SensedChannel> channels = sensed_channels(sheet);
   Measurement seen;
-  BenchLog log(sheet, ticks, spec.with_truth, spec.is_electrical);
+  BenchLog log(sheet, ticks, spec.with_truth, spec.is_electrical, program.command_channels);
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     if (tick % 1000 == 0) {
       report_progress(progress, static_cast<double>(tick) / static_cast<double>(ticks),
                       "simulating");
     }
     const Measurement measured = bench.sense();
-    log.add(measured, bench.truth());
     seen = with_last_numbers(measured, tick == 0 ? bench.sound() : seen, channels);
-    bench.act(program.next(seen));
+    const BenchAction action = program.next(seen);
+    log.add(measured, bench.truth(), action.commanded);
+    bench.act(action);
   }
-  return log.finish(fmt::format("{} {} seed {}", full_name(sheet), entry.info.name, spec.seed));
+  Recording recording =
+      log.finish(fmt::format("{} {} seed {}", full_name(sheet), entry.info.name, spec.seed));
+  for (const auto& [name, value] : program.log_conditions) recording.add_condition(name, value);
+  return recording;
 }
 
 std::vector<double> measured_twist(const DataSheet& sheet, const Recording& recording) {

@@ -15,8 +15,9 @@ namespace {
 
 std::vector<ExperimentEntry> table() {
   std::vector<ExperimentEntry> all;
-  for (const auto entries : {series_elastic_experiments(), elastomer_experiments(),
-                             rubber_clutch_experiments(), harmonic_drive_experiments()})
+  for (const auto entries :
+       {series_elastic_experiments(), elastomer_experiments(), rubber_clutch_experiments(),
+        harmonic_drive_experiments(), air_experiments()})
     all.insert(all.end(), entries.begin(), entries.end());
   return all;
 }

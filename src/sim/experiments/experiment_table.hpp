@@ -26,6 +26,7 @@ struct ExperimentEntry {
   double highest_torque_Nm = std::numeric_limits<double>::infinity();
   double highest_angle_rad = 0.0;
   bool has_frequency = false;
+  bool has_band = false;  ///< lowest and highest frequency
   bool has_impedance = false;
   BenchProgram (*program)(const DataSheet& sheet, const ExperimentSpec& spec) = nullptr;
 };
@@ -35,6 +36,8 @@ struct ExperimentEntry {
 [[nodiscard]] std::span<const ExperimentEntry> harmonic_drive_experiments() noexcept;
 [[nodiscard]] std::span<const ExperimentEntry> rubber_clutch_experiments() noexcept;
 [[nodiscard]] std::span<const ExperimentEntry> elastomer_experiments() noexcept;
+/// Those of several families: a lever with a known mass in the air.
+[[nodiscard]] std::span<const ExperimentEntry> air_experiments() noexcept;
 
 /// @throws UsageError that lists the names known for this family.
 [[nodiscard]] const ExperimentEntry& experiment_entry(std::string_view name,

@@ -21,20 +21,11 @@ constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
 constexpr double kShortChirp_s = 10.0;
 constexpr double kHold_rad = rad_from_deg(90.0);
 
-/// The lever with its mass. @throws UsageError if it is too heavy.
+double lever_mass_kg(const ExperimentSpec& spec) { return spec.mass_kg.value_or(kLeverMass_kg); }
+
 Load bench_lever(const DataSheet& sheet, const ExperimentSpec& spec) {
-  const double length_m = spec.lever_m.value_or(sweep_protocol(sheet).train_lever_m.front());
-  const Load load = lever(kLeverMass_kg, length_m, spec.inclination_rad);
-  if (std::abs(load.gravity_Nm) > sheet.rating.torque_Nm.value) {
-    throw UsageError({.place = spec.experiment,
-                      .problem = "the lever is too heavy for the actuator",
-                      .expected = fmt::format("at most the {} Nm that {} is rated for",
-                                              sheet.rating.torque_Nm.value, sheet.name),
-                      .found = fmt::format("{:.1f} Nm ({} kg at {} m)", load.gravity_Nm,
-                                           kLeverMass_kg, length_m),
-                      .advice = "take a shorter lever, or incline it"});
-  }
-  return load;
+  return bearable_lever(sheet, spec, lever_mass_kg(spec),
+                        spec.lever_m.value_or(sweep_protocol(sheet).train_lever_m.front()));
 }
 
 BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
@@ -81,7 +72,7 @@ double torque_amplitude(const DataSheet& sheet, const ExperimentSpec& spec) {
 BenchProgram torque_tracking(const DataSheet& sheet, const ExperimentSpec& spec, auto reference) {
   Load load{.is_locked = true};
   if (spec.lever_m) {
-    load = lever(kLeverMass_kg, *spec.lever_m, spec.inclination_rad);
+    load = lever(lever_mass_kg(spec), *spec.lever_m, spec.inclination_rad);
     check_swing({.place = spec.experiment,
                  .load = load,
                  .duration_s = spec.duration_s.value_or(kTorqueTest_s),

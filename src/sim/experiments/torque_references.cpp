@@ -50,6 +50,19 @@ double lever_m(const DataSheet& sheet, double share_of_rated) {
   return share_of_rated * sheet.rating.torque_Nm.value / lever(kLeverMass_kg, 1.0).gravity_Nm;
 }
 
+Load bearable_lever(const DataSheet& sheet, const ExperimentSpec& spec, double mass_kg,
+                    double length_m) {
+  const Load load = lever(mass_kg, length_m, spec.inclination_rad);
+  if (std::abs(load.gravity_Nm) <= sheet.rating.torque_Nm.value) return load;
+  throw UsageError(
+      {.place = spec.experiment,
+       .problem = "the lever is too heavy for the actuator",
+       .expected = fmt::format("at most the {} Nm that {} is rated for",
+                               sheet.rating.torque_Nm.value, sheet.name),
+       .found = fmt::format("{:.1f} Nm ({} kg at {} m)", load.gravity_Nm, mass_kg, length_m),
+       .advice = "take a shorter lever, or incline it"});
+}
+
 void check_swing(const Swing& swing, const DataSheet& sheet) {
   const double inertia_kg_m2 = swing.load.inertia_kg_m2 + sheet.joint.inertia_kg_m2.value;
   const double period_s = 1.0 / kBenchRate_Hz;

@@ -7,6 +7,7 @@
 #include "sim/plant/plant.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/signal/excitation.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 // The torques that the benches of more than one family ask for (specification 4.7).
 
@@ -31,6 +32,10 @@ constexpr double kWalkAmplitude = 0.35;
 constexpr double kLeverMass_kg = 9.0;
 /// Distance from the axis at which its weight, held level, is a share of the actuator's rated torque.
 [[nodiscard]] double lever_m(const DataSheet& sheet, double share_of_rated);
+
+/// The lever with its mass. @throws UsageError if it is too heavy for the actuator.
+[[nodiscard]] Load bearable_lever(const DataSheet& sheet, const ExperimentSpec& spec,
+                                  double mass_kg, double length_m);
 
 /// A lever that a torque is to move.
 struct Swing {

@@ -24,7 +24,8 @@ std::size_t whole_ticks_a_sample(double rate_Hz) {
 
 }  // namespace
 
-BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, bool is_electrical)
+BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, bool is_electrical,
+                   const std::vector<std::string>& command_channels)
     : rate_Hz_(sheet.sensors.log_rate_Hz.value), ticks_a_sample_(whole_ticks_a_sample(rate_Hz_)) {
   const std::size_t samples = ticks / ticks_a_sample_ + 1;
   for (const SensedChannel& source : sensed_channels(sheet, is_electrical)) {
@@ -32,6 +33,10 @@ BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, b
         Sensed{.source = source, .channel = {.name = std::string(source.name), .values = {}}});
     of.channel.values.reserve(samples);
     of.channel.fresh.reserve(samples);
+  }
+  for (const std::string& name : command_channels) {
+    commands_.push_back({.name = name, .values = {}});
+    commands_.back().values.reserve(samples);
   }
   if (!with_truth) return;
   for (TruthChannel& source : truth_channels(sheet, is_electrical)) {
@@ -41,7 +46,8 @@ BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, b
   }
 }
 
-void BenchLog::add(const Measurement& measured, const BenchTruth& truth) {
+void BenchLog::add(const Measurement& measured, const BenchTruth& truth,
+                   std::span<const double> commanded) {
   for (Sensed& of : sensed_) of.is_fresh = of.is_fresh || measured.*of.source.is_fresh;
   if (tick_++ % ticks_a_sample_ != 0) return;
   for (Sensed& of : sensed_) {
@@ -49,6 +55,7 @@ void BenchLog::add(const Measurement& measured, const BenchTruth& truth) {
     of.channel.fresh.push_back(of.is_fresh ? 1 : 0);
     of.is_fresh = false;
   }
+  for (std::size_t i = 0; i < commands_.size(); ++i) commands_[i].values.push_back(commanded[i]);
   for (Truth& of : truth_) of.channel.values.push_back(of.value(truth));
 }
 
@@ -61,6 +68,7 @@ Recording BenchLog::finish(std::string name) {
     if (is_always_fresh && of.source.name != load_cell) fresh.clear();
     recording.add(std::move(of.channel));
   }
+  for (Channel& command : commands_) recording.add(std::move(command));
   for (Truth& of : truth_) recording.add(std::move(of.channel));
   return recording;
 }

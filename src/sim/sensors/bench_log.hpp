@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,10 +19,13 @@ namespace torsio {
 class BenchLog {
  public:
   /// @param ticks of the bench's loop in the whole run; a logger may be slower
-  BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, bool is_electrical = false);
+  /// @param command_channels what is commanded, logged after the sensors
+  BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, bool is_electrical = false,
+           const std::vector<std::string>& command_channels = {});
 
-  /// Call at every tick.
-  void add(const Measurement& measured, const BenchTruth& truth);
+  /// Call at every tick. @param commanded one value at least for each of the command channels
+  void add(const Measurement& measured, const BenchTruth& truth,
+           std::span<const double> commanded = {});
   /// A channel whose sensor delivered for each sample has no freshness, except the load cell's.
   [[nodiscard]] Recording finish(std::string name);
 
@@ -40,6 +44,7 @@ class BenchLog {
   std::size_t ticks_a_sample_;
   std::size_t tick_ = 0;
   std::vector<Sensed> sensed_;  ///< the torque is the last
+  std::vector<Channel> commands_;
   std::vector<Truth> truth_;
 };
 

@@ -23,12 +23,16 @@ struct ExperimentSpec {
   std::uint64_t seed = 1;
   std::optional<double> duration_s = {};  ///< none: that of the experiment's protocol
   std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`, or locked
-  double inclination_rad = 0.0;  ///< angle of the lever's plane of motion from the vertical
+  std::optional<double> mass_kg = {};  ///< on the lever; none: 9 kg, or what the experiment states
+  double inclination_rad = 0.0;        ///< angle of the lever's plane of motion from the vertical
   // Excitation; an experiment has one of the amplitudes (`ExperimentInfo::amplitude_unit`); none:
   // its default.
   std::optional<double> torque_amplitude_Nm = {};
   std::optional<double> angle_amplitude_rad = {};
   std::optional<double> frequency_Hz = {};
+  // Ends of the band of an experiment in the air; none: 0.1 and 8 Hz.
+  std::optional<double> lowest_frequency_Hz = {};
+  std::optional<double> highest_frequency_Hz = {};
   bool is_impedance_zero = false;  ///< impedance of the joint's controller is zero; false: high
   /// The motor has windings, an inverter and field-oriented current control (`ElectricalSheet`)
   /// instead of a lag; phase currents, supply current and stator temperature are logged as well.
