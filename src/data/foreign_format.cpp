@@ -88,10 +88,12 @@ bool has_json_lines(std::string_view start, std::string_view path) {
 
 [[noreturn]] void refuse(const std::string& path, std::string_view name,
                          const std::string& advice) {
-  throw Error({.place = path,
-               .expected = "CSV, MCAP, .npz, .mat, or a bag of ROS",
-               .found = std::string(name),
-               .advice = advice});
+  throw Error(
+      {.place = path,
+       .expected =
+           "CSV, MCAP, .npz, .mat, a bag of ROS, or JSON of BAM (an object with \"entries\")",
+       .found = std::string(name),
+       .advice = advice});
 }
 
 }  // namespace

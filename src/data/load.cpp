@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "data/channel_names.hpp"
+#include "data/facts_of_run.hpp"
 #include "data/mapping/canonical_channels.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
@@ -148,13 +149,15 @@ std::vector<Recording> load(const Log& log, const std::string& target,
   const bool is_unfinished = table.is_unfinished;
   Mapping mapping = log.mapping;
   if (!needed.empty()) keep_needed(mapping, table, needed);
+  use_rate_of_format(table, mapping, log.rate_Hz);
+  const auto conditions = std::move(table.conditions);
   std::vector<Recording> recordings =
       measured_recordings(std::move(table), mapping, log.rate_Hz, log.entry.name);
   const std::string text = mapping_text(log.mapping);
   for (Recording& recording : recordings) {
     if (log.rate_Hz > 0.0 && recording.sample_rate_Hz() != log.rate_Hz)
       recording = resample(recording, log.rate_Hz);
-    for (const auto& [name, value] : log.entry.conditions) recording.add_condition(name, value);
+    add_conditions(recording, log.entry, conditions);
     add_derived(recording, mapping.derive);
     if (needed.empty()) {
       derive_target(recording, target);
@@ -246,6 +249,7 @@ class Collector {
     });
     for (std::vector<DatasetRecord>& records : of_logs)
       std::ranges::move(records, std::back_inserter(dataset_.records));
+    name_twins_by_file(dataset_.records);
     dataset_.target_computed_from.assign(leaks_.begin(), leaks_.end());
     return std::move(dataset_);
   }

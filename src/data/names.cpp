@@ -63,7 +63,7 @@ std::string file_stem(std::string_view path) {
   if (path.ends_with('/')) path.remove_suffix(1);  // a folder
   std::string_view stem = path.substr(path.find_last_of('/') + 1);
   for (const std::string_view ending : {".gz", ".zst", ".zstd", ".csv", ".tsr", ".mcap", ".npz",
-                                        ".mat", ".bag", ".db3", ".yaml", ".yml"})
+                                        ".mat", ".bag", ".db3", ".json", ".yaml", ".yml"})
     if (stem.size() > ending.size() && stem.ends_with(ending)) stem.remove_suffix(ending.size());
   return std::string(stem);
 }

@@ -16,6 +16,7 @@
 #include "data/arrays/npz.hpp"
 #include "data/arrays/zip_archive.hpp"
 #include "data/bag/bag_records.hpp"
+#include "data/bam/bam_log.hpp"
 #include "data/byte_source.hpp"
 #include "data/csv/csv_table.hpp"
 #include "data/db3/db3_messages.hpp"
@@ -64,7 +65,7 @@ class PeekedBytes final : public ByteSource {
   std::size_t given_ = 0;
 };
 
-enum class Format : std::uint8_t { text, mcap, bag, db3, npz, mat };
+enum class Format : std::uint8_t { text, mcap, bag, db3, npz, mat, bam };
 
 struct Mark {
   std::string_view mark;
@@ -83,6 +84,7 @@ constexpr std::array<Mark, 6> kMarks{{{kMcapMark, Format::mcap},
 Format format_of(std::string_view start, const std::string& path) {
   for (const Mark& mark : kMarks)
     if (start.starts_with(mark.mark)) return mark.format;
+  if (is_bam_log(start)) return Format::bam;
   return path.ends_with(".mat") ? Format::mat : Format::text;
 }
 
@@ -188,6 +190,7 @@ struct OpenFiles {
 };
 
 void refuse_if_foreign(const OpenFiles& files) {
+  if (files.format() == Format::bam) return;
   for (std::size_t i = 0; i < files.paths.size(); ++i)
     refuse_foreign_format(files.sources[i]->start(), name_of(files.paths[i]));
 }
@@ -257,6 +260,8 @@ LogTable read_log(const std::string& path, const ReadLogOptions& options) {
   if (has_messages(format)) {
     const OpenMessages messages(files, format, options.progress);
     table = table_of_messages(messages.all(), name, {.wanted = options.wanted});
+  } else if (format == Format::bam) {
+    table = read_bam_log(*files.sources.front(), name, options.progress);
   } else if (format == Format::npz) {
     table =
         table_of_arrays(read_archive(path, *files.sources.front(), options), name, options.wanted);

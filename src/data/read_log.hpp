@@ -18,7 +18,7 @@ struct ReadLogOptions {
 };
 
 /// A log of any format, which its first bytes show: CSV; messages in MCAP, in a database or folder of
-/// rosbag2, in a bag of ROS 1; arrays in `.npz` and `.mat`. All but `.mat` may be packed by gzip or zstd. "-" is
+/// rosbag2, in a bag of ROS 1; arrays in `.npz` and `.mat`; JSON of BAM. All but `.mat` may be packed by gzip or zstd. "-" is
 /// standard input.
 /// @throws Error as the readers of the formats, and for a known format that is not read.
 [[nodiscard]] LogTable read_log(const std::string& path, const ReadLogOptions& options = {});

@@ -84,6 +84,7 @@ Recording resample(const Recording& recording, double sample_rate_Hz) {
   result.definitions = recording.definitions;
   result.zeros = recording.zeros;
   result.columns = recording.columns;
+  result.labels = recording.labels;
   if (recording.size() == 0) return result;
 
   const double step = recording.sample_rate_Hz() / sample_rate_Hz;

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/provenance.hpp"
@@ -45,6 +46,7 @@ class Recording {
   Recording(std::string name, double sample_rate_Hz, double start_s = 0.0);
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  void rename(std::string name) { name_ = std::move(name); }
   [[nodiscard]] double sample_rate_Hz() const noexcept { return sample_rate_Hz_; }
   [[nodiscard]] double time_s(std::size_t sample) const noexcept {
     return start_s_ + static_cast<double>(sample) / sample_rate_Hz_;
@@ -76,6 +78,8 @@ class Recording {
   /// For advice on a mapping; the clock is `t_s`. Empty for a recording that was not read from a file.
   std::vector<ColumnOfChannel> columns;
   std::string mapping;  ///< `mapping_text` of the mapping that it was read with; empty: none
+  /// What the file says of the run in words, to group recordings by: {"trajectory", "sin_sin"}.
+  std::vector<std::pair<std::string, std::string>> labels;
   std::vector<std::string> notes;  ///< what reading the file assumed, in sentences
   std::vector<std::string>
       not_read;  ///< arrays of the file that are not read: "z (complex numbers)"

@@ -19,6 +19,7 @@
 #include "data/foreign_format.hpp"
 #include "data/little_endian.hpp"
 #include "data/names.hpp"
+#include "data/read_all.hpp"
 #include "data/written_columns.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/estimate.hpp"
@@ -28,7 +29,6 @@ namespace {
 
 constexpr std::string_view kEnding = ".npy";
 constexpr std::string_view kNumpyMark{"\x93NUMPY", 6};
-constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
 /// The longest header that is read.
 constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 16;
 
@@ -286,16 +286,8 @@ ReadArrays read_npz(const PlacedBytes& bytes, const std::string& name,
 
 ReadArrays read_npz(ByteSource& source, const std::string& name,
                     const std::vector<std::string>& wanted, const Progress& progress) {
-  std::string bytes;
   ReadBudget budget(name, progress);
-  std::string block;
-  bool is_whole = true;
-  while (is_whole) {
-    is_whole = read_exactly(source, block, kBlockBytes);
-    budget.read_to(source.bytes_read());
-    budget.require(bytes.size() + block.size());
-    bytes += block;
-  }
+  const std::string bytes = read_all(source, budget);
   return read_npz(*placed_bytes(bytes), name, wanted, progress);
 }
 

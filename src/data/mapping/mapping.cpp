@@ -63,7 +63,8 @@ std::vector<NamedRows> runs_of_equal_value(LogTable& table, const Mapping& mappi
 
 std::vector<NamedRows> records_of(LogTable& table, std::size_t rows, const Mapping& mapping,
                                   const std::string& name) {
-  const std::string stem = name.empty() ? file_stem(table.source.file) : name;
+  const std::string& given = name.empty() ? table.recording_name : name;
+  const std::string stem = given.empty() ? file_stem(table.source.file) : given;
   if (!mapping.split_by.empty()) return runs_of_equal_value(table, mapping, stem);
   return {{.name = stem, .rows = {.begin = 0, .end = rows}}};
 }
@@ -281,6 +282,7 @@ Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows 
   recording.source = table.source;
   recording.zeros = mapping.zero;
   recording.columns = std::move(named);
+  recording.labels = table.labels;
   recording.notes = table.notes;
   recording.not_read = table.not_read;
   if (trimmed > 0)
