@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "fit/common/training_rules.hpp"
 #include "numerics/reversals.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/fit/common/load_target.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/fit/families.hpp"
@@ -123,6 +125,8 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   ModelCard card = card_for(dataset, choice, options, context.seed);
   std::vector<std::string> notes;
   card.mapping = training_mapping(dataset, notes);
+  if (dataset.load_target.is_used())
+    std::ranges::move(load_target_notes(dataset.load_target), std::back_inserter(notes));
   note_left_out(data.training, notes);
   if (data.validation) note_left_out(*data.validation, notes);
   const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);

@@ -77,6 +77,23 @@ TEST_F(KnownLoadProgram, IsRefusedWhereItIsNoLoadOrTheInputIsItsComputation) {
   EXPECT_NE(one.err.find("all recordings have the same load"), std::string::npos) << one.err;
 }
 
+TEST_F(KnownLoadProgram, IsTheTargetOfComparisonsAndFolds) {
+  record();
+  ASSERT_EQ(
+      torsio("simulate dfki-50 sweep --duration 20s --lever 0.17m --seed 7 -o new.csv").exit_code,
+      0);
+  (void)folder_.file("new.yaml",
+                     "mapping: {drop: [torque_Nm, torque_fresh_1]}\n"
+                     "files: [{file: new.csv, conditions: {lever_m: 0.17}}]\n");
+  const std::string models = " --load load.yaml --models linear,polynomial,maxwell_slip --json -";
+  const Outcome compared = torsio("compare sweeps.yaml --test new.yaml" + models);
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  EXPECT_LT(nlohmann::json::parse(compared.out).at("results").at(0).at("rmse"), 1.5);
+  const Outcome folds = torsio("crossvalidate sweeps.yaml --folds 3" + models);
+  ASSERT_EQ(folds.exit_code, 0) << folds.err;
+  EXPECT_EQ(nlohmann::json::parse(folds.out).at("target"), "torque_Nm");
+}
+
 TEST_F(KnownLoadProgram, IsChecked) {
   record();
   const Outcome checked = torsio("check sweeps.yaml --load load.yaml");

@@ -133,10 +133,16 @@ void DataFlags::add_load(CLI::App& verb, const char* help) {
   verb.add_option("--load", load_file, help);
 }
 
-void DataFlags::compute_target(torsio::Dataset& dataset, const torsio::FeatureSpec& features,
-                               const torsio::LoadTarget& before) const {
+void DataFlags::add_target(torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                           const torsio::LoadTarget& before) const {
   if (load_file.empty()) return;
   torsio::add_load_target(dataset, torsio::read_load_sheet(load_file), features, before);
+}
+
+void DataFlags::compute_target(torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                               const torsio::LoadTarget& before) const {
+  add_target(dataset, features, before);
+  if (load_file.empty()) return;
   for (const std::string& note : torsio::load_target_notes(dataset.load_target)) remark(note);
 }
 

@@ -52,8 +52,11 @@ struct DataFlags {
                                             const torsio::Progress& progress) const;
   [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
-  /// With `--load` the target becomes the torque of the known load (`torsio::add_load_target`), with remarks.
+  /// With `--load` the target becomes the torque of the known load (`torsio::add_load_target`).
   /// @param before how that of a model was computed
+  void add_target(torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                  const torsio::LoadTarget& before = {}) const;
+  /// The same with remarks, for a verb that does not print them as notes of a fit.
   void compute_target(torsio::Dataset& dataset, const torsio::FeatureSpec& features,
                       const torsio::LoadTarget& before = {}) const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that

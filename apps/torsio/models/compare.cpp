@@ -36,9 +36,9 @@ void run(CompareFlags& flags) {
       flags.test);
   require_model_file(flags.output);
   ProgressBar progress;
-  const torsio::Dataset dataset =
-      flags.data.load(flags.validation, flags.test, progress.listener());
+  torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, progress.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+  flags.data.compute_target(dataset, features);
   warn_of_failed_checks(dataset, features);
   warn_of_other_motions(dataset, features);
   std::optional<torsio::StructureSearch> search;
@@ -92,6 +92,9 @@ void add_compare(CLI::App& app) {
   flags->data.add_mapping(*verb);
   flags->data.add_initialise(*verb);
   flags->data.add_target_and_inputs(*verb);
+  flags->data.add_load(*verb,
+                       "load file: the target is the torque of this known load "
+                       "(docs/use/known_load.md)");
   verb->add_option("--test", flags->test, "held-out recordings, on which the models are ranked");
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
   add_models(*verb, flags->models,

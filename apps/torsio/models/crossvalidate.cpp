@@ -68,9 +68,10 @@ void run(CrossValidateFlags& flags) {
                                   .embargo_s = torsio::si_quantity(flags.embargo, "s", "--embargo"),
                                   .by = flags.by};
   ProgressBar progress;
-  const torsio::Dataset dataset = flags.data.load({}, {}, progress.listener());
+  torsio::Dataset dataset = flags.data.load({}, {}, progress.listener());
   const auto choices = choices_of(flags, settings, dataset);
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+  flags.data.compute_target(dataset, features);
   warn_of_failed_checks(dataset, features);
   warn_of_other_motions_in_folds(dataset, features, scheme, flags.seed);
   const torsio::CrossValidation validation = torsio::cross_validate(
@@ -102,6 +103,9 @@ void add_crossvalidate(CLI::App& app) {
   flags->data.add_mapping(*verb);
   flags->data.add_initialise(*verb);
   flags->data.add_target_and_inputs(*verb);
+  flags->data.add_load(*verb,
+                       "load file: the target is the torque of this known load "
+                       "(docs/use/known_load.md)");
   add_models(*verb, flags->models, ", which are added by name: all,lstm");
   verb->add_option("--set", flags->settings, "set an option of every model, option=value")
       ->allow_extra_args(false);

@@ -156,7 +156,7 @@ void run_one(FitFlags& flags) {
   ProgressBar progress;
   torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
-  flags.data.compute_target(dataset, features);
+  flags.data.add_target(dataset, features);
   const torsio::FitCheck check = torsio::check_for_fit(dataset, features, flags.allow_leak);
   warn_of_failed_checks(check);
   torsio::ReportedFit fit =
