@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <random>
 #include <span>
 
@@ -144,30 +143,37 @@ DriveSolution better(const DriveSolution& a, const DriveSolution& b) {
   return b.cost < a.cost ? b : a;
 }
 
-/// Stiffness, armature and friction of a first guess, since a search from one stiffness stays at its resonance.
+/// A guess of the spring over three decades, each with the best of several motors: a search from one stiffness stays at
+/// its resonance.
 std::vector<DriveValues> spring_starts(const DriveProblem& problem, const DriveValues& typical,
                                        const DriveValues& one_mass) {
   using enum DriveParameter;
-  std::vector<DriveValues> starts;
   constexpr int kStiffnesses = 16;
-  for (const DriveValues* motor : {&typical, &one_mass})
-    for (const double inertia_factor : {0.4, 1.0, 2.5})
-      for (int k = 0; k < kStiffnesses; ++k) {
+  constexpr std::array kInertias{0.4, 1.0, 2.5};
+  std::vector<DriveValues> starts;
+  for (int k = 0; k < kStiffnesses; ++k) {
+    const double factor = std::pow(10.0, -1.5 + 3.0 * k / (kStiffnesses - 1));
+    std::vector<DriveValues> motors;
+    for (const DriveValues* motor : {&typical, &one_mass})
+      for (const double inertia : kInertias) {
         DriveValues values = typical;
-        for (const SearchedDriveParameter& parameter : problem.searched) {
-          const DriveParameterInfo& info = drive_parameters()[parameter.index];
-          if (info.term <= DriveTerm::direction)
+        for (const SearchedDriveParameter& parameter : problem.searched)
+          if (drive_parameters()[parameter.index].term <= DriveTerm::direction)
             values[parameter.index] = (*motor)[parameter.index];
-        }
-        at(values, armature) *= inertia_factor;
-        const double factor = std::pow(10.0, -1.5 + 3.0 * k / (kStiffnesses - 1));
-        at(values, stiffness) = at(typical, stiffness) * factor;
-        at(values, spring_damping) = at(typical, spring_damping) * std::sqrt(factor);
+        at(values, armature) *= inertia;
+        at(values, stiffness) *= factor;
+        at(values, spring_damping) *= std::sqrt(factor);
+        at(values, hysteresis_width) /= factor;
+        at(values, backlash) /= factor;
         for (const SearchedDriveParameter& parameter : problem.searched)
           values[parameter.index] =
               std::clamp(values[parameter.index], parameter.lowest, parameter.highest);
-        starts.push_back(values);
+        motors.push_back(values);
       }
+    const std::vector<double> costs = costs_of(problem, motors, {});
+    starts.push_back(
+        motors[static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin())]);
+  }
   return starts;
 }
 
@@ -178,15 +184,15 @@ DriveSolution fit_two_masses(const DriveProblem& problem, const DriveLogs& logs,
   DriveFitOptions quick = options;
   quick.starts = 1;
   const DriveSolution stiff = fit_drive(logs, one, quick);
-  const std::vector<DriveValues> starts = spring_starts(problem, typical, stiff.values);
-  const std::vector<double> costs = costs_of(problem, starts, {});
-  std::vector<std::size_t> order(starts.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::size_t k) { return costs[k]; });
+  constexpr std::size_t kFirstIterations = 5;
+  std::vector<DriveSolution> near;
+  for (const DriveValues& start : spring_starts(problem, typical, stiff.values))
+    near.push_back(search_drive(problem, start, {}, std::span(kDifferences).first(1),
+                                kFirstIterations, options.progress));
+  std::ranges::stable_sort(near, {}, &DriveSolution::cost);
   DriveSolution best{.values = typical, .cost = HUGE_VAL};
-  for (std::size_t k = 0; k < std::min(std::max<std::size_t>(options.starts, 1), order.size()); ++k)
-    best =
-        better(best, descend(problem, starts[order[k]], 0.0, kDifferences, 40, options.progress));
+  for (std::size_t k = 0; k < std::min(std::max<std::size_t>(options.starts, 1), near.size()); ++k)
+    best = better(best, descend(problem, near[k].values, 0.0, kDifferences, 40, options.progress));
   return best;
 }
 

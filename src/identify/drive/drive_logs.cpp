@@ -58,6 +58,16 @@ std::vector<double> slow_samples(const std::vector<double>& goal,
   return change;
 }
 
+/// That of the drive file, else the condition of the recording, else 1.
+double gear_ratio(const Recording& recording, const DriveSheet& drive) {
+  if (drive.gear_ratio || !recording.has("gear_ratio_1")) return drive.gear_ratio.value_or(1.0);
+  const double ratio = fact_in({.condition = "gear_ratio_1"}, recording, drive.file, "gear_ratio");
+  if (ratio > 0.0) return ratio;
+  throw Error({.place = recording.name() + ": gear_ratio_1",
+               .expected = "a ratio above 0",
+               .found = fmt::format("{:.6g}", ratio)});
+}
+
 void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log) {
   const auto fact = [&](const LoadFact& stated, std::string_view name) {
     return fact_in(stated, recording, drive.file, name);
@@ -123,8 +133,10 @@ DriveLog drive_log(const Recording& recording, const LoadSheet& load, const Driv
                  .found = fmt::format("{}", recording.size())});
   const std::string angle = angle_channel(recording, drive);
   log.angle_rad = finite_channel(recording, angle);
-  if (angle == "motor_angle_rad" && drive.gear_ratio != 1.0)
-    for (double& value : log.angle_rad) value /= drive.gear_ratio;
+  if (angle == "motor_angle_rad") {
+    const double ratio = gear_ratio(recording, drive);
+    for (double& value : log.angle_rad) value /= ratio;
+  }
   set_law(recording, drive, log);
   if (recording.has("enabled_1")) log.enabled = finite_channel(recording, "enabled_1");
   log.load = known_load(load, recording);

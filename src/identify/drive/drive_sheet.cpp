@@ -96,8 +96,9 @@ DriveSheet sheet_from(const YamlValue& root, const std::string& name) {
   if (const auto command = drive.find("command")) sheet.command = command->text();
   if (const auto angle = drive.find("angle")) sheet.angle = angle->text();
   if (const auto ratio = drive.find("gear_ratio")) {
-    sheet.gear_ratio = ratio->plain_number(1e5);
-    if (!(sheet.gear_ratio > 0.0)) ratio->refuse("a ratio above 0");
+    const double value = ratio->plain_number(1e5);
+    if (!(value > 0.0)) ratio->refuse("a ratio above 0");
+    sheet.gear_ratio = value;
   }
   if (sheet.law == DriveLaw::position) read_position(drive, sheet);
   if (sheet.law == DriveLaw::position || sheet.law == DriveLaw::voltage) read_winding(drive, sheet);

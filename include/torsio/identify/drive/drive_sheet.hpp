@@ -29,8 +29,8 @@ struct DriveSheet {
   std::string command;  ///< channel; empty: by the law (`command_channels`)
   std::string
       angle;  ///< channel; empty: motor_angle_rad, gear_angle_rad or joint_angle_rad, the first that exists
-  double gear_ratio = 1.0;
-  LoadFact gain = {.value = 1.0};  ///< position: a number that multiplies `error_gain_1_rad`
+  std::optional<double> gear_ratio;  ///< empty: the condition gear_ratio_1, else 1
+  LoadFact gain = {.value = 1.0};    ///< position: a number that multiplies `error_gain_1_rad`
   std::optional<double>
       error_gain_1_rad;  ///< duty for a radian at gain 1; empty: measured from the duty
   double max_duty_1 = 1.0;
