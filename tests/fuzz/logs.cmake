@@ -1,5 +1,6 @@
 torsio_fuzzer(mcap torsio::data)
 torsio_fuzzer(bag torsio::data)
+torsio_fuzzer(bam torsio::data)
 torsio_fuzzer(npz torsio::data)
 torsio_fuzzer(mat torsio::data)
 torsio_fuzzer(db3 torsio::data)
