@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include "data/channel_names.hpp"
 #include "data/names.hpp"
@@ -22,6 +23,8 @@ constexpr double kNarrower = 2.0 / 3.0;
 constexpr double kLongest_s = 0.5;         ///< half-width: joints move faster than that
 constexpr std::size_t kLeastWindows = 10;  ///< in the shortest recording
 constexpr std::size_t kEnough = 20000;     ///< samples of an angle
+constexpr double kCertain = 1.05;    ///< share of the noise above which a difference is a loss
+constexpr double kHopeless = 100.0;  ///< times the least square
 
 /// Straight lines over the samples at which the value was only held.
 void bridge_held(const Channel& channel, std::vector<double>& values) {
@@ -64,32 +67,55 @@ double noise_variance(std::span<const double> angle_rad, double sample_rate_Hz) 
   return square_of_difference(angle_rad, wide, narrow) / wide.variance_of_difference(narrow);
 }
 
-AccelerationError error_at(std::span<const double> angle_rad, double variance,
-                           std::size_t half_width, double sample_rate_Hz) {
-  const auto narrower =
-      std::max(LocalQuartic::kLeastHalfWidth,
-               static_cast<std::size_t>(std::lround(kNarrower * static_cast<double>(half_width))));
-  const LocalQuartic wide(half_width, sample_rate_Hz);
-  const LocalQuartic narrow(narrower, sample_rate_Hz);
-  const double together = square_of_difference(angle_rad, wide, narrow) -
-                          variance * wide.variance_of_difference(narrow);
-  const double share =
-      1.0 - std::pow(static_cast<double>(narrower) / static_cast<double>(half_width), 4);
-  return {.noise_rad_s2 = std::sqrt(variance * wide.curvature_variance()),
-          .loss_rad_s2 = std::sqrt(std::max(0.0, together)) / share};
+/// The errors of one angle from narrow to wide polynomials.
+class WidthScan {
+ public:
+  WidthScan(std::span<const double> angle_rad, double sample_rate_Hz)
+      : angle_rad_(angle_rad),
+        sample_rate_Hz_(sample_rate_Hz),
+        variance_(noise_variance(angle_rad, sample_rate_Hz)) {}
+
+  /// @param half_width wider than before
+  AccelerationError next(std::size_t half_width) {
+    const auto narrower = std::max(
+        LocalQuartic::kLeastHalfWidth,
+        static_cast<std::size_t>(std::lround(kNarrower * static_cast<double>(half_width))));
+    const LocalQuartic wide(half_width, sample_rate_Hz_);
+    const LocalQuartic narrow(narrower, sample_rate_Hz_);
+    const double square = square_of_difference(angle_rad_, wide, narrow);
+    const double of_noise = variance_ * wide.variance_of_difference(narrow);
+    const double share =
+        1.0 - std::pow(static_cast<double>(narrower) / static_cast<double>(half_width), 4);
+    const double loss_rad_s2 = std::sqrt(std::max(0.0, square - of_noise)) / share;
+    // What a narrower polynomial has lost for certain does not come back where both have lost it.
+    if (square > kCertain * of_noise) lost_rad_s2_ = std::max(lost_rad_s2_, loss_rad_s2);
+    return {.noise_rad_s2 = std::sqrt(variance_ * wide.curvature_variance()),
+            .loss_rad_s2 = std::max(loss_rad_s2, lost_rad_s2_)};
+  }
+
+ private:
+  std::span<const double> angle_rad_;
+  double sample_rate_Hz_;
+  double variance_;
+  double lost_rad_s2_ = 0.0;
+};
+
+/// Half-widths that are tried, up to and with the longest.
+std::vector<std::size_t> widths_to(std::size_t longest) {
+  std::vector<std::size_t> all;
+  for (double width = 4.0; width <= static_cast<double>(longest); width *= kWidthStep)
+    if (const auto half_width = static_cast<std::size_t>(std::lround(width));
+        all.empty() || half_width > all.back())
+      all.push_back(half_width);
+  if (all.empty() || all.back() < longest) all.push_back(std::max<std::size_t>(longest, 4));
+  return all;
 }
 
-std::vector<std::size_t> widths(std::span<const WeightedAngle> angles, double sample_rate_Hz) {
+std::size_t longest_width(std::span<const WeightedAngle> angles, double sample_rate_Hz) {
   std::size_t shortest = std::numeric_limits<std::size_t>::max();
   for (const WeightedAngle& angle : angles) shortest = std::min(shortest, angle.angle_rad.size());
-  const double longest =
-      std::min(kLongest_s * sample_rate_Hz, static_cast<double>(shortest / (2 * kLeastWindows)));
-  std::vector<std::size_t> all;
-  for (double width = 4.0; all.empty() || width <= longest; width *= kWidthStep) {
-    const auto half_width = static_cast<std::size_t>(std::lround(width));
-    if (all.empty() || half_width > all.back()) all.push_back(half_width);
-  }
-  return all;
+  return std::min(static_cast<std::size_t>(kLongest_s * sample_rate_Hz),
+                  shortest / (2 * kLeastWindows));
 }
 
 }  // namespace
@@ -116,21 +142,19 @@ std::vector<double> load_angle(const Recording& recording) {
 }
 
 std::size_t choose_half_width(std::span<const WeightedAngle> angles, double sample_rate_Hz) {
-  std::vector<double> variances(angles.size());
-  for_each_chunk(angles.size(), 0, [&](std::size_t a) {
-    variances[a] = noise_variance(angles[a].angle_rad, sample_rate_Hz);
-  });
+  std::vector<WidthScan> scans;
+  for (const WeightedAngle& angle : angles) scans.emplace_back(angle.angle_rad, sample_rate_Hz);
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (const std::size_t half_width : widths(angles, sample_rate_Hz)) {
-    std::vector<AccelerationError> errors(angles.size());
+  for (const std::size_t half_width : widths_to(longest_width(angles, sample_rate_Hz))) {
+    std::vector<double> squares(angles.size());
     for_each_chunk(angles.size(), 0, [&](std::size_t a) {
-      errors[a] = error_at(angles[a].angle_rad, variances[a], half_width, sample_rate_Hz);
+      squares[a] = static_cast<double>(angles[a].angle_rad.size()) *
+                   scans[a].next(half_width).square() * angles[a].inertia_kg_m2 *
+                   angles[a].inertia_kg_m2;
     });
-    double sum = 0.0;
-    for (std::size_t a = 0; a < angles.size(); ++a)
-      sum += static_cast<double>(angles[a].angle_rad.size()) * errors[a].square() *
-             angles[a].inertia_kg_m2 * angles[a].inertia_kg_m2;
+    const double sum = std::accumulate(squares.begin(), squares.end(), 0.0);
+    if (sum > kHopeless * least) break;
     if (!(sum < least)) continue;
     least = sum;
     best = half_width;
@@ -140,7 +164,10 @@ std::size_t choose_half_width(std::span<const WeightedAngle> angles, double samp
 
 AccelerationError acceleration_error(std::span<const double> angle_rad, std::size_t half_width,
                                      double sample_rate_Hz) {
-  return error_at(angle_rad, noise_variance(angle_rad, sample_rate_Hz), half_width, sample_rate_Hz);
+  WidthScan scan(angle_rad, sample_rate_Hz);
+  AccelerationError error;
+  for (const std::size_t width : widths_to(half_width)) error = scan.next(width);
+  return error;
 }
 
 LoadMotion load_motion(std::span<const double> angle_rad, std::size_t half_width,

@@ -38,7 +38,8 @@ struct WeightedAngle {
 /// noise: what the encoder's noise, taken as white, leaves in q''. Its size follows from the difference between the
 /// polynomials of 4 and 6 samples, to which a motion hardly contributes.
 /// loss: from the difference between q'' at a width and at two thirds of it, less what noise leaves in it. Both lose
-/// in proportion to the fourth power of their widths.
+/// in proportion to the fourth power of their widths, until a motion is lost in both: what a narrower one has lost stays
+/// lost.
 /// @returns samples on either side
 [[nodiscard]] std::size_t choose_half_width(std::span<const WeightedAngle> angles,
                                             double sample_rate_Hz);

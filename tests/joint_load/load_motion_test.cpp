@@ -106,6 +106,31 @@ TEST(LoadMotion, ChoosesAWidthWhoseErrorIsNearlyTheLeastAndStatesIt) {
   }
 }
 
+TEST(LoadMotion, DoesNotTakeAMotionForLostNoise) {
+  // A slow swing with short fast strokes: polynomials of half a second miss these altogether, and agree again.
+  Random random(8);
+  Swing made;
+  for (std::size_t n = 0; n < 40000; ++n) {
+    const double w = 2.0 * std::numbers::pi * 3.0;
+    const double t = std::fmod(at_s(n), 10.0) - 5.0;
+    const double envelope = std::exp(-t * t / 0.08);
+    made.angle_rad.push_back(std::sin(0.3 * at_s(n)) + 0.05 * envelope * std::sin(w * t) +
+                             1e-5 * random.normal());
+    const double slope = -2.0 * t / 0.08;
+    const double curvature = slope * slope - 2.0 / 0.08;
+    made.acceleration_rad_s2.push_back(
+        -0.09 * std::sin(0.3 * at_s(n)) +
+        0.05 * envelope *
+            ((curvature - w * w) * std::sin(w * t) + 2.0 * slope * w * std::cos(w * t)));
+  }
+  const WeightedAngle angle{made.angle_rad, 1.0};
+  const std::size_t chosen = choose_half_width({&angle, 1}, kRate_Hz);
+  EXPECT_LT(chosen, 60U);
+  EXPECT_LT(error_of(made, chosen), 1.5 * error_of(made, 25));
+  EXPECT_GT(std::sqrt(acceleration_error(made.angle_rad, 400, kRate_Hz).square()),
+            0.3 * error_of(made, 400));
+}
+
 TEST(LoadMotion, BridgesSamplesAtWhichTheEncoderDidNotDeliver) {
   Recording recording("sweep", kRate_Hz);
   recording.add({"joint_angle_rad", {0.0, 0.0, 0.0, 0.3, 0.3}, {1, 0, 0, 1, 0}});

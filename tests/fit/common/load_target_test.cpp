@@ -96,6 +96,18 @@ TEST(LoadTarget, IsNearTheTrueTorqueAndStatesItsError) {
               testing::ElementsAre("joint_angle_rad", "lever_m", "tilt_rad"));
 }
 
+TEST(LoadTarget, StatesTheErrorOfEachRecordingAlone) {
+  const Dataset& all = sweeps_without_sensor();
+  for (std::size_t r = 0; r < 3; ++r) {
+    Dataset dataset;
+    dataset.records = {all.records[r]};
+    add_load_target(dataset, parse_load_sheet(kExactLoad, "load.yaml"), {});
+    const double error_Nm = rms_from_truth(dataset.records[0].recording, "torque_Nm");
+    EXPECT_LT(error_Nm, 0.05) << r;
+    EXPECT_NEAR(dataset.load_target.motion_error_Nm / error_Nm, 1.0, 0.5) << r;
+  }
+}
+
 TEST(LoadTarget, TrainsASpringWithoutASensor) {
   const Dataset dataset = with_load(kTiltedLoad);
   const FeatureSpec features = resolve_inputs(dataset, {});
