@@ -12,6 +12,11 @@
 
 namespace torsio {
 
+/// The channels of the log for what a bench is asked to do, one of which every experiment has.
+inline constexpr const char* kGoalAngle =
+    "goal_angle_rad";  ///< the joint, or the input of a clutch
+inline constexpr const char* kGoalTorque = "goal_torque_Nm";
+
 /// A controller of a bench has at most so many commands that are logged.
 inline constexpr std::size_t kMaxCommands = 2;
 using BenchCommands = std::array<double, kMaxCommands>;

@@ -30,7 +30,7 @@ constexpr double kHighestOfAir_Hz = 8.0;
 /// Above it the amplitude falls with the frequency, so that the speed stays: at 20 deg 0.9 rad/s, below the rated
 /// speed of every actuator that states one.
 constexpr double kConstantSpeed_Hz = 0.4;
-constexpr double kLeverShare = 0.3;        // of the rated torque, held level
+constexpr double kLeverShare = 0.3;  // share of the rated torque that its weight is, held level
 constexpr double kElastomerMass_kg = 1.0;  // 9 kg would hang at 2 cm
 constexpr double kStepHold_s = 1.0;
 constexpr std::size_t kTonesOfAir = 12;
@@ -127,7 +127,7 @@ BenchProgram in_air(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double amplitude_rad = spec.angle_amplitude_rad.value_or(kAirAmplitude_rad);
   return {.start = load,
           .duration_s = kAirDuration_s,
-          .command_channels = {"goal_angle_rad", "command_torque_Nm"},
+          .command_channels = {kGoalAngle, "command_torque_Nm"},
           .log_conditions = {{"kp_Nm_rad", gains.kp_Nm_rad},
                              {"kd_Nms_rad", gains.kd_Nms_rad},
                              {"torque_limit_Nm", gains.torque_limit_Nm},

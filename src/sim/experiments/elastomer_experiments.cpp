@@ -76,11 +76,13 @@ BenchTorqueLoop torque_loop(const DataSheet& sheet) {
 BenchProgram torque_tracking(const DataSheet& sheet, double duration_s, auto reference) {
   return {.start = kLocked,
           .duration_s = duration_s,
+          .command_channels = {kGoalTorque},
           .next = [reference = std::move(reference),
                    loop = torque_loop(sheet)](const Measurement& measured) mutable -> BenchAction {
+            const double wanted_Nm = reference.step();
             const double current_A =
-                loop.step(reference.step(), measured.torque_Nm, measured.motor_angle_rad);
-            return {.command = {.current_A = current_A}, .load = kLocked};
+                loop.step(wanted_Nm, measured.torque_Nm, measured.motor_angle_rad);
+            return {.command = {.current_A = current_A}, .load = kLocked, .commanded = {wanted_Nm}};
           }};
 }
 
@@ -159,21 +161,23 @@ BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {
 /// Creep under a torque, relaxation with the rotor clamped where it came to, recovery without load.
 BenchProgram elastomer_hold(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(3.0);
-  return {.start = kLocked,
-          .duration_s = 3.0 * kPhase_s,
-          .next = [amplitude_Nm, clock = detail::SampleClock(kBenchRate_Hz),
-                   loop = torque_loop(sheet)](const Measurement& measured) mutable -> BenchAction {
-            const double time_s = clock.next_s();
-            if (time_s >= kPhase_s && time_s < 2.0 * kPhase_s) {
-              loop.reset();
-              return {.command = {.is_motor_held = true}, .load = kLocked};
-            }
-            const double wanted_Nm =
-                time_s < kPhase_s ? std::min(amplitude_Nm, kHoldRamp_Nm_s * time_s) : 0.0;
-            const double current_A =
-                loop.step(wanted_Nm, measured.torque_Nm, measured.motor_angle_rad);
-            return {.command = {.current_A = current_A}, .load = kLocked};
-          }};
+  return {
+      .start = kLocked,
+      .duration_s = 3.0 * kPhase_s,
+      .command_channels = {kGoalTorque},
+      .next = [amplitude_Nm, clock = detail::SampleClock(kBenchRate_Hz),
+               loop = torque_loop(sheet)](const Measurement& measured) mutable -> BenchAction {
+        const double time_s = clock.next_s();
+        if (time_s >= kPhase_s && time_s < 2.0 * kPhase_s) {
+          loop.reset();
+          // The torque that the rotor was brought to; from now on nothing follows it.
+          return {.command = {.is_motor_held = true}, .load = kLocked, .commanded = {amplitude_Nm}};
+        }
+        const double wanted_Nm =
+            time_s < kPhase_s ? std::min(amplitude_Nm, kHoldRamp_Nm_s * time_s) : 0.0;
+        const double current_A = loop.step(wanted_Nm, measured.torque_Nm, measured.motor_angle_rad);
+        return {.command = {.current_A = current_A}, .load = kLocked, .commanded = {wanted_Nm}};
+      }};
 }
 
 constexpr auto kElastomerTable = std::to_array<ExperimentEntry>({

@@ -35,10 +35,13 @@ BenchProgram static_cycle_program(double amplitude_Nm, LoadCell load_cell) {
   return {.start = {},
           .load_cell = load_cell,
           .duration_s = kCycles / kCycle_Hz,
+          .command_channels = {kGoalTorque},
           .next = [ramp = Triangle({.amplitude = amplitude_Nm, .frequency_Hz = kCycle_Hz},
                                    kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
+            const double torque_Nm = ramp.step();
             return {.command = {.is_motor_held = true},
-                    .load = {.external_torque_Nm = ramp.step()}};
+                    .load = {.external_torque_Nm = torque_Nm},
+                    .commanded = {-torque_Nm}};  // as the load cell counts it
           }};
 }
 

@@ -36,7 +36,7 @@ struct ExperimentEntry {
 [[nodiscard]] std::span<const ExperimentEntry> harmonic_drive_experiments() noexcept;
 [[nodiscard]] std::span<const ExperimentEntry> rubber_clutch_experiments() noexcept;
 [[nodiscard]] std::span<const ExperimentEntry> elastomer_experiments() noexcept;
-/// Those of several families: a lever with a known mass in the air.
+/// A lever with a known mass in the air, in several families.
 [[nodiscard]] std::span<const ExperimentEntry> air_experiments() noexcept;
 
 /// @throws UsageError that lists the names known for this family.

@@ -9,6 +9,7 @@ namespace torsio {
 namespace {
 
 constexpr std::string_view kHarmonicDriveActuators = "harmonic-drive";
+constexpr double kGoal_rad = 0.0;  // the impedance controller stays there
 constexpr double kHumanTorque_Nm = 20.0;
 constexpr double kHumanFrequency_Hz = 0.4;
 constexpr double kHighestHumanTorque_Nm = 50.0;
@@ -20,7 +21,7 @@ BenchImpedanceLoop impedance_loop(const DataSheet& sheet, bool is_zero) {
 }
 
 double current(const BenchImpedanceLoop& loop, const Measurement& measured) {
-  return loop.step(0.0, measured.motor_angle_rad, measured.middle_angle_rad,
+  return loop.step(kGoal_rad, measured.motor_angle_rad, measured.middle_angle_rad,
                    measured.joint_angle_rad);
 }
 
@@ -29,6 +30,7 @@ BenchProgram human_torque(const DataSheet& sheet, const ExperimentSpec& spec) {
   return {.start = {},
           .load_cell = LoadCell::external,
           .duration_s = 600.0,
+          .command_channels = {kGoalAngle},
           .next = [loop = impedance_loop(sheet, spec.is_impedance_zero),
                    // Not the numbers that the sensors' noise is made of.
                    hand = QuasiPeriodic(
@@ -37,7 +39,8 @@ BenchProgram human_torque(const DataSheet& sheet, const ExperimentSpec& spec) {
                         .seed = Random(spec.seed).bits()},
                        kBenchRate_Hz)](const Measurement& measured) mutable -> BenchAction {
             return {.command = {.current_A = current(loop, measured)},
-                    .load = {.external_torque_Nm = hand.step()}};
+                    .load = {.external_torque_Nm = hand.step()},
+                    .commanded = {kGoal_rad}};
           }};
 }
 
@@ -49,10 +52,13 @@ BenchProgram harmonic_drive_hold(const DataSheet& sheet, const ExperimentSpec& s
   return {.start = {},
           .load_cell = LoadCell::external,
           .duration_s = 60.0,
+          .command_channels = {kGoalAngle},
           .next = [loop = impedance_loop(sheet, spec.is_impedance_zero),
                    load = Load{.external_torque_Nm = spec.torque_amplitude_Nm.value_or(0.0)}](
                       const Measurement& measured) -> BenchAction {
-            return {.command = {.current_A = current(loop, measured)}, .load = load};
+            return {.command = {.current_A = current(loop, measured)},
+                    .load = load,
+                    .commanded = {kGoal_rad}};
           }};
 }
 

@@ -154,12 +154,15 @@ BenchProgram turning(const DataSheet& sheet, const Load& load, double duration_s
                      Reference reference) {
   return {.start = load,
           .duration_s = duration_s,
+          .command_channels = {kGoalAngle},
           .next = [load, reference = std::move(reference),
                    loop = BenchPositionLoop(plant_parameters(sheet), kBenchRate_Hz,
                                             kClutchBandwidth_rad_s)](
                       const Measurement& measured) mutable -> BenchAction {
-            return {.command = {.current_A = loop.step(reference.step(), measured.motor_angle_rad)},
-                    .load = load};
+            const double goal_rad = reference.step();
+            return {.command = {.current_A = loop.step(goal_rad, measured.motor_angle_rad)},
+                    .load = load,
+                    .commanded = {goal_rad}};
           }};
 }
 

@@ -35,6 +35,7 @@ BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double duration_s = 5.0 * protocol.amplitude_rad / kSweepSpeed_rad_s;
   return {.start = load,
           .duration_s = duration_s,
+          .command_channels = {kGoalAngle},
           .next = [load,
                    reference = TrapezoidSweep({.amplitude = protocol.amplitude_rad,
                                                .speed = kSweepSpeed_rad_s,
@@ -42,8 +43,10 @@ BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
                                               kBenchRate_Hz),
                    loop = BenchPositionLoop(plant_parameters(sheet), kBenchRate_Hz)](
                       const Measurement& measured) mutable -> BenchAction {
-            return {.command = {.current_A = loop.step(reference.step(), measured.motor_angle_rad)},
-                    .load = load};
+            const double goal_rad = reference.step();
+            return {.command = {.current_A = loop.step(goal_rad, measured.motor_angle_rad)},
+                    .load = load,
+                    .commanded = {goal_rad}};
           }};
 }
 
@@ -56,10 +59,12 @@ BenchProgram series_elastic_hold(const DataSheet& sheet, const ExperimentSpec& s
   return {.start = load,
           .start_angle_rad = kHold_rad,
           .duration_s = 60.0,
+          .command_channels = {kGoalAngle},
           .next = [load, loop = BenchPositionLoop(plant_parameters(sheet), kBenchRate_Hz)](
                       const Measurement& measured) mutable -> BenchAction {
             return {.command = {.current_A = loop.step(kHold_rad, measured.motor_angle_rad)},
-                    .load = load};
+                    .load = load,
+                    .commanded = {kHold_rad}};
           }};
 }
 
@@ -89,11 +94,15 @@ BenchProgram torque_tracking(const DataSheet& sheet, const ExperimentSpec& spec,
   return {
       .start = load,
       .duration_s = kTorqueTest_s,
+      .command_channels = {kGoalTorque},
       .next = [load, reference, stiffness_Nm_rad, loop = BenchDeflectionLoop(plant, kBenchRate_Hz)](
                   const Measurement& measured) mutable -> BenchAction {
         const double deflection_rad = measured.middle_angle_rad - measured.joint_angle_rad;
-        const double wanted_rad = reference.step() / stiffness_Nm_rad;
-        return {.command = {.current_A = loop.step(wanted_rad, deflection_rad)}, .load = load};
+        const double wanted_Nm = reference.step();
+        const double wanted_rad = wanted_Nm / stiffness_Nm_rad;
+        return {.command = {.current_A = loop.step(wanted_rad, deflection_rad)},
+                .load = load,
+                .commanded = {wanted_Nm}};
       }};
 }
 

@@ -58,6 +58,7 @@ double BenchPdLoop::step(double wanted_rad, double rotor_angle_rad) noexcept {
   torque_Nm_ =
       std::clamp(gains_.kp_Nm_rad * (wanted_rad - angle_rad) - gains_.kd_Nms_rad * speed_rad_s,
                  -gains_.torque_limit_Nm, gains_.torque_limit_Nm);
+  if (!std::isfinite(torque_Nm_)) reset();  // finite numbers, whose difference is not
   return torque_Nm_;
 }
 

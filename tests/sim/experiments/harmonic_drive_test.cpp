@@ -255,6 +255,7 @@ TEST(HumanTorque, SameSeedSameRecordingOtherSeedOtherHand) {
   const Recording differing = pushed("harmonic-drive", 20.0, 5);
   for (const Channel& channel : first.channels()) {
     EXPECT_EQ(channel.values, again.channel(channel.name).values) << channel.name;
+    if (channel.name == "goal_angle_rad") continue;  // the impedance controller stays at 0
     EXPECT_NE(channel.values, differing.channel(channel.name).values) << channel.name;
   }
   EXPECT_EQ(first.sample_rate_Hz(), 100.0);

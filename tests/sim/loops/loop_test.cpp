@@ -7,11 +7,13 @@
 
 #include "sim/loops/bench_deflection_loop.hpp"
 #include "sim/loops/bench_impedance_loop.hpp"
+#include "sim/loops/bench_pd_loop.hpp"
 #include "sim/loops/bench_position_loop.hpp"
 #include "sim/loops/bench_torque_loop.hpp"
 #include "sim/plant/plant.hpp"
 #include "support/numbers.hpp"
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -30,18 +32,20 @@ std::vector<Loop> loops_with_memory() {
   const PlantParameters plant = plant_parameters(data_sheet("dfki-50"));
   const double stiffness_Nm_rad =
       std::get<Spring::Parameters>(plant.second).elastic.stiffness_Nm_rad;
-  return {{"position",
-           [loop = BenchPositionLoop(plant, kRate_Hz)](double wanted, double measured) mutable {
-             return loop.step(wanted, measured);
-           }},
-          {"deflection",
-           [loop = BenchDeflectionLoop(plant, kRate_Hz)](double wanted, double measured) mutable {
-             return loop.step(wanted, measured);
-           }},
-          {"torque", [loop = BenchTorqueLoop(plant, stiffness_Nm_rad, kRate_Hz)](
-                         double wanted, double measured) mutable {
-             return loop.step(wanted, measured, 0.01);
-           }}};
+  return {
+      {"position",
+       [loop = BenchPositionLoop(plant, kRate_Hz)](double wanted, double measured) mutable {
+         return loop.step(wanted, measured);
+       }},
+      {"deflection",
+       [loop = BenchDeflectionLoop(plant, kRate_Hz)](double wanted, double measured) mutable {
+         return loop.step(wanted, measured);
+       }},
+      {"torque",
+       [loop = BenchTorqueLoop(plant, stiffness_Nm_rad, kRate_Hz)](
+           double wanted, double measured) mutable { return loop.step(wanted, measured, 0.01); }},
+      {"PD", [loop = BenchPdLoop(plant, BenchPdLoop::gains(plant, 0.4, 50.0), kRate_Hz)](
+                 double wanted, double measured) mutable { return loop.step(wanted, measured); }}};
 }
 
 TEST(Loops, PassOverWhatIsNotFinite) {
@@ -70,6 +74,29 @@ TEST(Loops, StartAgainAfterNumbersBeyondWhatTheyHold) {
       EXPECT_TRUE(std::isfinite(loop.step(0.0, measured))) << loop.name;
     for (int i = 0; i < 10; ++i) EXPECT_TRUE(std::isfinite(loop.step(0.01, 0.0))) << loop.name;
   }
+}
+
+TEST(Loops, PdRefusesGainsThatAreNegativeOrNotFiniteAndNoTorque) {
+  const PlantParameters plant = plant_parameters(data_sheet("dfki-50"));
+  const auto make = [&](double kp, double kd, double limit) {
+    return BenchPdLoop(plant, {kp, kd, limit}, kRate_Hz);
+  };
+  EXPECT_NO_THROW(static_cast<void>(make(0.0, 0.0, 1.0)));
+  EXPECT_THROW(static_cast<void>(make(-1.0, 0.0, 1.0)), Error);
+  EXPECT_THROW(static_cast<void>(make(1.0, kNaN, 1.0)), Error);
+  EXPECT_THROW(static_cast<void>(make(1.0, 1.0, 0.0)), Error);
+}
+
+TEST(Loops, PdTurnsTheErrorOfTheJointIntoTorqueUpToItsLimit) {
+  const PlantParameters plant = plant_parameters(data_sheet("dfki-50"));
+  BenchPdLoop loop(plant, {.kp_Nm_rad = 100.0, .kd_Nms_rad = 2.0, .torque_limit_Nm = 30.0},
+                   kRate_Hz);
+  EXPECT_DOUBLE_EQ(loop.step(0.1, 0.0), 10.0);
+  // 1 rad/s of the joint for a millisecond, 120 times that of the rotor.
+  EXPECT_NEAR(loop.step(0.1, 120.0 * 1e-3), 100.0 * (0.1 - 1e-3) - 2.0 * 1.0, 1e-9);
+  EXPECT_DOUBLE_EQ(loop.step(1.0, 120.0 * 1e-3), 30.0);
+  EXPECT_DOUBLE_EQ(loop.step(-1.0, 120.0 * 1e-3), -30.0);
+  EXPECT_NEAR(loop.current(30.0), 30.0 / (120.0 * plant.motor.torque_constant_Nm_A), 1e-12);
 }
 
 TEST(Loops, ImpedanceGivesNoCurrentForWhatIsNotFinite) {
