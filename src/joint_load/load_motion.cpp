@@ -102,12 +102,15 @@ class WidthScan {
 
 /// Half-widths that are tried, up to and with the longest.
 std::vector<std::size_t> widths_to(std::size_t longest) {
+  constexpr std::size_t kFirst = 4;
   std::vector<std::size_t> all;
-  for (double width = 4.0; width <= static_cast<double>(longest); width *= kWidthStep)
-    if (const auto half_width = static_cast<std::size_t>(std::lround(width));
-        all.empty() || half_width > all.back())
-      all.push_back(half_width);
-  if (all.empty() || all.back() < longest) all.push_back(std::max<std::size_t>(longest, 4));
+  double width = kFirst;
+  for (std::size_t next = kFirst; next <= longest;) {
+    if (all.empty() || next > all.back()) all.push_back(next);
+    width *= kWidthStep;
+    next = static_cast<std::size_t>(std::lround(width));
+  }
+  if (all.empty() || all.back() < longest) all.push_back(std::max(longest, kFirst));
   return all;
 }
 

@@ -49,6 +49,7 @@ std::vector<double> place_of(const YamlValue& value) {
   if (!value.is_list() || items.size() != 3)
     value.refuse("a list of three lengths: the centre of mass in the frame of the link");
   std::vector<double> at_m;
+  at_m.reserve(items.size());
   for (const YamlValue& item : items) at_m.push_back(item.number("m"));  // as in a URDF
   return at_m;
 }
@@ -110,6 +111,7 @@ void read_error(const YamlValue& value, const NamedFact& fact) {
 void read_errors(const YamlValue& map, LoadSheet& sheet) {
   const std::vector<NamedFact> facts = facts_of(sheet);
   std::vector<std::string> names;
+  names.reserve(facts.size());
   for (const NamedFact& fact : facts) names.emplace_back(fact.name);
   map.allow_only(names);
   for (const auto& [name, value] : map.entries())
