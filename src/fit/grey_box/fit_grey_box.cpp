@@ -19,6 +19,7 @@
 #include "fit/common/folds.hpp"
 #include "fit/common/model_run.hpp"
 #include "fit/grey_box/grey_box_search.hpp"
+#include "fit/grey_box/late_target.hpp"
 #include "fit/mixture/fit_dgmm.hpp"
 #include "fit/network/fit_network.hpp"
 #include "numerics/parallel.hpp"
@@ -234,6 +235,33 @@ void keep(FittedGreyBox& fitted, const GreyBoxSearch& search,
                   chosen.held_out_error, without));
 }
 
+/// "the torque is late", and what to do about it.
+std::string note_of_lag(const TrainingData& data, const LateTarget& late,
+                        const GreyBoxSearch::Candidate& chosen, double without) {
+  const double lag_ms = 1e3 * late.lag.samples / data.sample_rate_Hz;
+  return fmt::format(
+      "{0} is late by about {1:.2g} ms: a bank over a rate, which would make up for that on slow "
+      "motions and give wrong "
+      "values on fast ones, was not added; held out: RMSE {2:.4g} where the lag is taken out, "
+      "{3:.4g} with "
+      "the bank, {4:.4g} with neither. Write  latency: {{{0}: {1:.2g}ms}}  in the mapping",
+      data.target, lag_ms, late.lag.held_out_error, chosen.held_out_error, without);
+}
+
+/// Whether the banks over rates only make up for a late target; then without them, with a note.
+bool leave_to_latency(FittedGreyBox& fitted, const GreyBoxSearch& search, const GreyBoxChoice& main,
+                      const GreyBoxSearch::Candidate& chosen, const TrainingData& data,
+                      const GreyBoxOptions& options, double rate_share, const Progress& progress) {
+  if (!has_bank_over_rate(search.fitted(chosen.choice).terms, data)) return false;
+  const auto late = explained_by_lag(data, options.schedule, rate_share, main, chosen, progress);
+  if (!late) return false;
+  const double without = search.held_out_error(main);
+  if (!search.fitted(late->beside).terms.banks.empty())
+    keep(fitted, search, search.rated(late->beside), data, without);
+  fitted.notes.push_back(note_of_lag(data, *late, chosen, without));
+  return true;
+}
+
 /// Adds the banks that predict better what is held out; none: the box stays as it is.
 void add_banks(FittedGreyBox& fitted, const GreyBoxChoice& main, const TrainingData& data,
                const GreyBoxOptions& options, double rate_share, const Progress& progress) {
@@ -246,6 +274,7 @@ void add_banks(FittedGreyBox& fitted, const GreyBoxChoice& main, const TrainingD
                     search.what_was_held_out()));
     return;
   }
+  if (leave_to_latency(fitted, search, main, chosen, data, options, rate_share, progress)) return;
   // The terms of the first input were chosen to describe what the banks describe better.
   GreyBoxChoice line{.is_passive = options.passive, .banks = {}};
   for (const BankChoice& bank : chosen.choice.banks)

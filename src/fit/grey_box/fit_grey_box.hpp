@@ -72,7 +72,8 @@ using FittedGreyBox = Fitted<GreyBox>;
 /// not read the data again. Smoothing: λ n Σ (second difference)² over the knots of curve and
 /// forces. Deterministic. Then banks over other inputs are added where they lower the folds' errors in
 /// their geometric mean by a tenth (a fifth on blocks), and the terms of the first input are chosen
-/// again beside them (`GreyBoxSearch::choose_banks`).
+/// again beside them (`GreyBoxSearch::choose_banks`). A bank over a rate is not added where a lag of the
+/// target explains as much (`explained_by_lag`); a note then states the lag.
 /// @throws Error if the first input is constant, or as `groups_by`, or UsageError for a residual of a passive box.
 [[nodiscard]] FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
                                          const FitContext& context = {});
