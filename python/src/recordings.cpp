@@ -374,27 +374,34 @@ void bind_recordings(py::module_& module) {
   module.def(
       "simulate",
       [](const std::string& actuator, const std::string& experiment, std::uint64_t seed,
-         std::optional<double> duration_s, std::optional<double> lever_m, double inclination_rad,
+         std::optional<double> duration_s, std::optional<double> lever_m,
+         std::optional<double> mass_kg, double inclination_rad,
          std::optional<double> torque_amplitude_Nm, std::optional<double> angle_amplitude_rad,
-         std::optional<double> frequency_Hz, bool is_electrical, bool with_truth) {
+         std::optional<double> frequency_Hz, std::optional<double> lowest_frequency_Hz,
+         std::optional<double> highest_frequency_Hz, bool is_electrical, bool with_truth) {
         const ExperimentSpec spec{.actuator = actuator,
                                   .experiment = experiment,
                                   .seed = seed,
                                   .duration_s = duration_s,
                                   .lever_m = lever_m,
+                                  .mass_kg = mass_kg,
                                   .inclination_rad = inclination_rad,
                                   .torque_amplitude_Nm = torque_amplitude_Nm,
                                   .angle_amplitude_rad = angle_amplitude_rad,
                                   .frequency_Hz = frequency_Hz,
+                                  .lowest_frequency_Hz = lowest_frequency_Hz,
+                                  .highest_frequency_Hz = highest_frequency_Hz,
                                   .is_electrical = is_electrical,
                                   .with_truth = with_truth};
         return interruptible([&](const Progress& progress) { return simulate(spec, progress); });
       },
       py::arg("actuator"), py::arg("experiment") = "sweep", py::kw_only(), py::arg("seed") = 1,
       py::arg("duration_s") = py::none(), py::arg("lever_m") = py::none(),
-      py::arg("inclination_rad") = 0.0, py::arg("torque_amplitude_Nm") = py::none(),
-      py::arg("angle_amplitude_rad") = py::none(), py::arg("frequency_Hz") = py::none(),
-      py::arg("is_electrical") = false, py::arg("with_truth") = false,
+      py::arg("mass_kg") = py::none(), py::arg("inclination_rad") = 0.0,
+      py::arg("torque_amplitude_Nm") = py::none(), py::arg("angle_amplitude_rad") = py::none(),
+      py::arg("frequency_Hz") = py::none(), py::arg("lowest_frequency_Hz") = py::none(),
+      py::arg("highest_frequency_Hz") = py::none(), py::arg("is_electrical") = false,
+      py::arg("with_truth") = false,
       "One experiment on a simulated bench (docs/simulation/actuators.md). Equal arguments give "
       "equal "
       "recordings.");

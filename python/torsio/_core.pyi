@@ -251,10 +251,13 @@ def simulate(
     seed: int = ...,
     duration_s: float | None = ...,
     lever_m: float | None = ...,
+    mass_kg: float | None = ...,
     inclination_rad: float = ...,
     torque_amplitude_Nm: float | None = ...,
     angle_amplitude_rad: float | None = ...,
     frequency_Hz: float | None = ...,
+    lowest_frequency_Hz: float | None = ...,
+    highest_frequency_Hz: float | None = ...,
     is_electrical: bool = ...,
     with_truth: bool = ...,
 ) -> Recording: ...

@@ -18,7 +18,7 @@ inline constexpr const char* kGoalAngle =
 inline constexpr const char* kGoalTorque = "goal_torque_Nm";
 
 /// A controller of a bench has at most so many commands that are logged.
-inline constexpr std::size_t kMaxCommands = 2;
+inline constexpr std::size_t kMaxCommands = 3;
 using BenchCommands = std::array<double, kMaxCommands>;
 
 /// What the bench does to the plant until the next tick.

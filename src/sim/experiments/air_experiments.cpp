@@ -35,6 +35,9 @@ constexpr double kElastomerMass_kg = 1.0;  // 9 kg would hang at 2 cm
 constexpr double kStepHold_s = 1.0;
 constexpr std::size_t kTonesOfAir = 12;
 constexpr double kMultisineFade_s = 1.0;
+constexpr double kReleaseAngle_rad = rad_from_deg(60.0);
+constexpr double kHeld_s = 1.0;
+constexpr double kRelease_s = 6.0;
 
 struct Band {
   double lowest_Hz;
@@ -116,34 +119,66 @@ double air_lever(const DataSheet& sheet, const ExperimentSpec& spec, double mass
   return std::max(std::round(100.0 * length_m), 1.0) / 100.0;
 }
 
-template <GoalAngle (*goal_of)(const ExperimentSpec&, double, double)>
-BenchProgram in_air(const DataSheet& sheet, const ExperimentSpec& spec) {
+struct Air {
+  Load load;
+  BenchPdLoop loop;
+  double amplitude_rad;  ///< goals that begin where the lever hangs
+};
+
+/// The lever, its law, and what the log states of both.
+Air air(const DataSheet& sheet, const ExperimentSpec& spec, BenchProgram& program) {
   const double mass_kg = air_mass(sheet, spec);
   const double length_m = air_lever(sheet, spec, mass_kg);
   const Load load = bearable_lever(sheet, spec, mass_kg, length_m);
   const PlantParameters plant = plant_parameters(sheet);
   const BenchPdLoop::Gains gains =
       BenchPdLoop::gains(plant, load.inertia_kg_m2, sheet.rating.torque_Nm.value);
-  const double amplitude_rad = spec.angle_amplitude_rad.value_or(kAirAmplitude_rad);
-  return {.start = load,
-          .duration_s = kAirDuration_s,
-          .command_channels = {kGoalAngle, "command_torque_Nm"},
-          .log_conditions = {{"kp_Nm_rad", gains.kp_Nm_rad},
-                             {"kd_Nms_rad", gains.kd_Nms_rad},
-                             {"torque_limit_Nm", gains.torque_limit_Nm},
-                             {"gear_ratio_1", total_ratio(plant)},
-                             {"lever_m", length_m},
-                             {"mass_kg", mass_kg},
-                             {"inclination_rad", spec.inclination_rad}},
-          .next = [load, loop = BenchPdLoop(plant, gains, kBenchRate_Hz),
-                   goal = goal_of(spec, amplitude_rad, spec.duration_s.value_or(kAirDuration_s))](
-                      const Measurement& measured) mutable -> BenchAction {
-            const double goal_rad = goal();
-            const double torque_Nm = loop.step(goal_rad, measured.motor_angle_rad);
-            return {.command = {.current_A = loop.current(torque_Nm)},
-                    .load = load,
-                    .commanded = {goal_rad, torque_Nm}};
-          }};
+  program.start = load;
+  program.command_channels = {kGoalAngle, "command_torque_Nm"};
+  program.log_conditions = {{"kp_Nm_rad", gains.kp_Nm_rad},
+                            {"kd_Nms_rad", gains.kd_Nms_rad},
+                            {"torque_limit_Nm", gains.torque_limit_Nm},
+                            {"gear_ratio_1", total_ratio(plant)},
+                            {"lever_m", length_m},
+                            {"mass_kg", mass_kg},
+                            {"inclination_rad", spec.inclination_rad}};
+  return {load, BenchPdLoop(plant, gains, kBenchRate_Hz),
+          spec.angle_amplitude_rad.value_or(kAirAmplitude_rad)};
+}
+
+template <GoalAngle (*goal_of)(const ExperimentSpec&, double, double)>
+BenchProgram in_air(const DataSheet& sheet, const ExperimentSpec& spec) {
+  BenchProgram program{.start = {}, .duration_s = kAirDuration_s, .next = {}};
+  const Air of = air(sheet, spec, program);
+  program.next = [load = of.load, loop = of.loop,
+                  goal = goal_of(spec, of.amplitude_rad, spec.duration_s.value_or(kAirDuration_s))](
+                     const Measurement& measured) mutable -> BenchAction {
+    const double goal_rad = goal();
+    const double torque_Nm = loop.step(goal_rad, measured.motor_angle_rad);
+    return {.command = {.current_A = loop.current(torque_Nm)},
+            .load = load,
+            .commanded = {goal_rad, torque_Nm}};
+  };
+  return program;
+}
+
+/// The lever is held, then the power goes off with the winding open: the only run in which friction alone brakes.
+BenchProgram air_release(const DataSheet& sheet, const ExperimentSpec& spec) {
+  BenchProgram program{.start = {}, .duration_s = kRelease_s, .next = {}};
+  const Air of = air(sheet, spec, program);
+  const double goal_rad = spec.angle_amplitude_rad.value_or(kReleaseAngle_rad);
+  program.start_angle_rad = goal_rad;
+  program.command_channels.emplace_back("enabled_1");
+  program.next = [load = of.load, loop = of.loop, goal_rad,
+                  clock = detail::SampleClock(kBenchRate_Hz)](
+                     const Measurement& measured) mutable -> BenchAction {
+    const bool is_on = clock.next_s() < kHeld_s;
+    const double torque_Nm = is_on ? loop.step(goal_rad, measured.motor_angle_rad) : 0.0;
+    return {.command = {.current_A = loop.current(torque_Nm)},
+            .load = load,
+            .commanded = {goal_rad, torque_Nm, is_on ? 1.0 : 0.0}};
+  };
+  return program;
 }
 
 struct AirFamily {
@@ -171,7 +206,7 @@ constexpr auto air_table() {
       {{ActuatorFamily::series_elastic, "dfki-*"},
        {ActuatorFamily::elastomer, "elastomer"},
        {ActuatorFamily::harmonic_drive, "harmonic-drive"}}};
-  std::array<ExperimentEntry, 3 * kFamilies.size()> all;
+  std::array<ExperimentEntry, 4 * kFamilies.size()> all;
   for (std::size_t i = 0; i < kFamilies.size(); ++i) {
     all[i] = air_entry(kFamilies[i], "air-chirp",
                        "a lever with a known mass in the air follows an angle, 20 deg from 0.1 to "
@@ -185,6 +220,11 @@ constexpr auto air_table() {
         air_entry(kFamilies[i], "air-multisine",
                   "as air-chirp, with twelve sines at once whose phases are drawn from the seed",
                   true, in_air<multisine_goal>);
+    all[3 * kFamilies.size() + i] =
+        air_entry(kFamilies[i], "air-release",
+                  "the lever of air-chirp is held at 60 deg for a second, then the power goes off "
+                  "and it falls",
+                  false, air_release);
   }
   return all;
 }

@@ -163,6 +163,23 @@ TEST(AirExperiments, DrawTheirGoalsFromTheSeedAndStayWithinTheAmplitude) {
              "goal_angle_rad"));
 }
 
+// Without power nothing but friction and gravity act on the lever, which the log marks.
+TEST(AirRelease, LeverFallsWithoutPowerAndComesToRest) {
+  const Recording recording =
+      simulate({.experiment = "air-release", .lever_m = 0.24, .with_truth = true});
+  const LoggedValues& enabled = logged(recording, "enabled_1");
+  const LoggedValues& angle = logged(recording, "joint_angle_rad");
+  EXPECT_EQ(std::ranges::count(enabled, 1.0), 1000);
+  EXPECT_EQ(std::ranges::count(enabled, 0.0), 5000);
+  EXPECT_NEAR(angle[999], rad_from_deg(60.0), 0.08);
+  EXPECT_LT(angle.back(), rad_from_deg(35.0));
+  EXPECT_NEAR(angle.back(), angle[angle.size() - 200], 1e-3);
+  const LoggedValues& current = logged(recording, "truth_motor_current_A");
+  EXPECT_GT(std::abs(current[900]), 0.5);
+  EXPECT_LT(largest(std::span(current).last(4900)), 1e-9);
+  EXPECT_EQ(largest(std::span(logged(recording, "command_torque_Nm")).last(5000)), 0.0);
+}
+
 TEST(AirExperiments, RefuseWhatTheBenchCannotDo) {
   const auto refused = [](const ExperimentSpec& spec, const char* why) {
     const std::string text = refusal_of(spec);
