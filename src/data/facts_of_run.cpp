@@ -33,7 +33,7 @@ void name_twins_by_file(std::vector<DatasetRecord>& records) {
   for (DatasetRecord& record : records) {
     Recording& recording = record.recording;
     const std::string stem = file_stem(recording.source.file);
-    // Only what a file says of its run, its labels, gives two files one name.
+    // Only what a file states about its run gives two files one name.
     if (recording.labels.empty() || met[recording.name()] == 1 ||
         recording.name().find(stem) != std::string::npos)
       continue;

@@ -47,11 +47,11 @@ struct LogTable {
   /// "z (complex numbers)": arrays that are not read, and why.
   std::vector<std::string> not_read = {};
   bool is_unfinished = false;  ///< the recorder was stopped before it closed the file
-  // What the file says of the whole run.
+  // What the file states about the whole run.
   std::string recording_name = {};  ///< empty: the recording is named by the file
   std::vector<std::pair<std::string, double>> conditions = {};  ///< in SI
   std::vector<std::pair<std::string, std::string>> labels = {};
-  /// The rate onto which uneven stamps are interpolated where neither mapping nor user says; 0: they
+  /// The rate onto which uneven stamps are interpolated where neither mapping nor user states one; 0: they
   /// must be even.
   double resample_Hz = 0.0;
 

@@ -34,7 +34,7 @@ std::string entry(double t, double position, const std::string& load, bool is_on
          R"(, "goal_position": 0.25, "torque_enable": )" + (is_on ? "true" : "false") + "}";
 }
 
-/// Entries 6 ms and 4 ms apart, in turn, whose position is a straight line over time.
+/// Entries 6 ms and 4 ms apart, in turn, whose position grows evenly with time.
 std::string log_of(const std::string& motor = "xl330", const std::string& load = "885") {
   std::string text = header(motor);
   double t = 0.004;

@@ -78,7 +78,7 @@ class Recording {
   /// For advice on a mapping; the clock is `t_s`. Empty for a recording that was not read from a file.
   std::vector<ColumnOfChannel> columns;
   std::string mapping;  ///< `mapping_text` of the mapping that it was read with; empty: none
-  /// What the file says of the run in words, to group recordings by: {"trajectory", "sin_sin"}.
+  /// What the file states about the run in words, to group recordings by: {"trajectory", "sin_sin"}.
   std::vector<std::pair<std::string, std::string>> labels;
   std::vector<std::string> notes;  ///< what reading the file assumed, in sentences
   std::vector<std::string>

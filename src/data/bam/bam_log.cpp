@@ -118,7 +118,7 @@ class BamEvents final : public nlohmann::json_sax<nlohmann::json> {
 
   ReadBudget& budget_;
   std::string key_;
-  std::optional<std::size_t> field_;  ///< of the key
+  std::optional<std::size_t> field_;  ///< that has the name `key_`
   std::size_t depth_ = 0;
   bool is_in_entries_ = false;
 };
@@ -280,7 +280,7 @@ std::string label_of(const BamEvents& events, std::string_view name) {
   return at == events.labels.end() ? std::string() : at->second;
 }
 
-/// "sin_sin_kp400"; empty where the log does not say.
+/// "sin_sin_kp400"; empty where the log has no trajectory.
 std::string name_of_run(const BamEvents& events) {
   const std::string trajectory = label_of(events, "trajectory");
   const auto kp =

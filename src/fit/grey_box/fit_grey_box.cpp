@@ -240,7 +240,7 @@ std::string note_of_lag(const TrainingData& data, const LateTarget& late,
                         const GreyBoxSearch::Candidate& chosen, double without) {
   const double lag_ms = 1e3 * late.lag.samples / data.sample_rate_Hz;
   return fmt::format(
-      "{0} is late by about {1:.2g} ms: a bank over a rate, which would make up for that on slow "
+      "{0} is late by about {1:.2g} ms: a bank over a rate, which would compensate that on slow "
       "motions and give wrong "
       "values on fast ones, was not added; held out: RMSE {2:.4g} where the lag is taken out, "
       "{3:.4g} with "
@@ -248,7 +248,7 @@ std::string note_of_lag(const TrainingData& data, const LateTarget& late,
       data.target, lag_ms, late.lag.held_out_error, chosen.held_out_error, without);
 }
 
-/// Whether the banks over rates only make up for a late target; then without them, with a note.
+/// Whether the banks over rates only compensate a late target; then without them, with a note.
 bool leave_to_latency(FittedGreyBox& fitted, const GreyBoxSearch& search, const GreyBoxChoice& main,
                       const GreyBoxSearch::Candidate& chosen, const TrainingData& data,
                       const GreyBoxOptions& options, double rate_share, const Progress& progress) {

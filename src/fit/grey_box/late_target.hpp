@@ -16,7 +16,7 @@ struct TargetLag {
 };
 
 /// The lag at which terms without banks predict best what is held out: the lowest point of the parabola of the squared errors
-/// through whole samples, up to 50 ms. Terms that were chosen with the lag make up for a part of it, so that they are chosen
+/// through whole samples, up to 50 ms. Terms that were chosen with the lag compensate a part of it, so that they are chosen
 /// again where it is taken out, until it stays the same.
 /// @param main the terms to begin with
 [[nodiscard]] TargetLag find_target_lag(const TrainingData& data, const std::string& schedule,

@@ -21,7 +21,7 @@ constexpr double kLateRate_Hz = 500.0;
 constexpr GreyBoxOptions kBoxWithoutNetwork{.residual = ResidualKind::none};
 
 /// A progressive spring with a little dry friction. The torque arrives `late` samples after it acted; a damping may be positive
-/// on one side and negative on the other, which is no lag.
+/// on one side and negative on the other, which a lag is not.
 Sequence late_spring_record(double speed, std::size_t late, double damping_Nms_rad,
                             std::uint64_t seed) {
   Random random(seed);
@@ -84,7 +84,7 @@ double error_when_fast(const Fitted<GreyBox>& fitted) {
   return std::sqrt(sum / static_cast<double>(record.target.size()));
 }
 
-TEST(LateTarget, IsNotMendedByABankOverARate) {
+TEST(LateTarget, IsNotCompensatedByABankOverARate) {
   const Fitted<GreyBox> fitted = fit_grey_box(late_spring_data(5, 0.0), kBoxWithoutNetwork);
   EXPECT_FALSE(has_bank_over_rate(fitted.parameters.terms, late_spring_data(5, 0.0)))
       << notes_of(fitted);
