@@ -9,7 +9,8 @@
 namespace torsio {
 namespace {
 
-constexpr double kLeastGain = 0.02;     // share of the held-out error that a term must take away
+// A term goes if the held-out error falls by this share without it: a smaller change is within what the groups scatter.
+constexpr double kLeastFall = 0.03;
 constexpr std::size_t kCandidates = 3;  // terms whose held-out errors are computed
 
 /// A spring takes with it what needs it.
@@ -140,7 +141,7 @@ ChosenStructure choose_structure(const GroupedLogs& logs, const DriveTerms& larg
            .change = "without " + std::string(name(candidates[c])),
            .mae_rad = trials[c].mae_rad,
            .gain_error_rad = standard_error(trials[c].mae_of_log_rad, now.mae_of_log_rad)});
-    if (!(trials[best].mae_rad <= (1.0 + kLeastGain) * least)) break;
+    if (!(trials[best].mae_rad <= (1.0 - kLeastFall) * least)) break;
     chosen.trials[first + best].is_taken = true;
     chosen.held_out = std::move(trials[best]);
     least = std::min(least, chosen.held_out.mae_rad);

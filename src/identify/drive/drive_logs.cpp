@@ -58,7 +58,7 @@ std::vector<double> slow_samples(const std::vector<double>& goal,
   return change;
 }
 
-/// That of the drive file, else the condition of the recording, else 1.
+/// The ratio of the drive file, else the condition of the recording, else 1.
 double gear_ratio(const Recording& recording, const DriveSheet& drive) {
   if (drive.gear_ratio || !recording.has("gear_ratio_1")) return drive.gear_ratio.value_or(1.0);
   const double ratio = fact_in({.condition = "gear_ratio_1"}, recording, drive.file, "gear_ratio");
@@ -186,6 +186,19 @@ namespace {
 
 std::string text_of(double value) { return fmt::format("{:.6g}", value); }
 
+/// Texts of a label by recording, nothing if one lacks it.
+std::vector<std::string> label_of(const std::vector<Recording>& recordings,
+                                  const std::string& label) {
+  std::vector<std::string> texts;
+  for (const Recording& recording : recordings) {
+    const auto found =
+        std::ranges::find(recording.labels, label, &std::pair<std::string, std::string>::first);
+    if (found == recording.labels.end()) return {};
+    texts.push_back(found->second);
+  }
+  return texts;
+}
+
 /// Values of a condition by recording, nothing if one lacks it.
 std::vector<std::string> values_of(const std::vector<Recording>& recordings,
                                    const std::string& condition) {
@@ -206,9 +219,10 @@ std::vector<std::string> drive_groups(const std::vector<Recording>& recordings,
   for (const Recording& recording : recordings) own.push_back(recording.name());
   if (!group_by.empty() && group_by != "recording") {
     std::vector<std::string> values = values_of(recordings, group_by);
+    if (values.empty()) values = label_of(recordings, group_by);
     if (!values.empty()) return values;
     throw UsageError({.place = "--group-by " + group_by,
-                      .expected = "a condition that all recordings have, or 'recording'",
+                      .expected = "a condition or a label that all recordings have, or 'recording'",
                       .found = "recordings without it"});
   }
   constexpr std::size_t kManyRecordings = 6;
