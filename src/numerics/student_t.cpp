@@ -8,7 +8,7 @@ namespace {
 
 /// P(|T| < t), Abramowitz and Stegun 26.7.3 and 26.7.4, exact for whole degrees of freedom.
 double probability_within(double t, std::size_t degrees_of_freedom) {
-  const double nu = static_cast<double>(degrees_of_freedom);
+  const auto nu = static_cast<double>(degrees_of_freedom);
   const double angle = std::atan(t / std::sqrt(nu));
   const double square = std::cos(angle) * std::cos(angle);
   const bool is_odd = degrees_of_freedom % 2 == 1;

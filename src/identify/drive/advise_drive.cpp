@@ -57,6 +57,7 @@ CandidateLog second_mass(const DriveLog& like, const DriveIdentification& identi
 std::optional<CandidateLog> gain_between(const std::vector<DriveLog>& logs,
                                          const DriveIdentification& identified) {
   std::vector<double> gains;
+  gains.reserve(logs.size());
   for (const DriveLog& log : logs) gains.push_back(log.gain);
   std::ranges::sort(gains);
   double widest = 1.2;

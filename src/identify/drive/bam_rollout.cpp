@@ -8,28 +8,28 @@ namespace torsio {
 namespace {
 
 enum Row : std::size_t {
-  kKt,
-  kR,
-  kArmature,
-  kOffset,
-  kBase,
-  kViscous,
-  kStribeck,
-  kSpeed,
-  kAlpha,
-  kLoad,
-  kLoadStribeck,
-  kMotor,
-  kExternal,
-  kMotorStribeck,
-  kExternalStribeck,
-  kMotorQuad,
-  kExternalQuad,
-  kBamRows
+  row_kt,
+  row_resistance,
+  row_armature,
+  row_offset,
+  row_base,
+  row_viscous,
+  row_stribeck,
+  row_speed,
+  row_alpha,
+  row_load,
+  row_load_stribeck,
+  row_motor,
+  row_external,
+  row_motor_stribeck,
+  row_external_stribeck,
+  row_motor_quad,
+  row_external_quad,
+  row_count
 };
 
 // The ranges are those in which BAM searches.
-constexpr std::array<BamParameter, kBamRows> kBamParameters{{
+constexpr std::array<BamParameter, row_count> kBamParameters{{
     {"kt", 0.1, 3.0, 0.5, true},
     {"R", 0.5, 10.0, 3.0, true},
     {"armature", 1e-4, 0.05, 2e-3, true},
@@ -48,7 +48,7 @@ constexpr std::array<BamParameter, kBamRows> kBamParameters{{
     {"load_friction_motor_quad", 1e-6, 0.01, 1e-3, true},
     {"load_friction_external_quad", 1e-6, 0.01, 1e-3, true},
 }};
-static_assert(kBamRows <= kDriveParameters);
+static_assert(row_count <= kDriveParameters);
 
 struct BamTerms {
   bool load;
@@ -66,20 +66,20 @@ constexpr std::array<BamTerms, kBamModels> kTerms{{{false, false, false, false},
 double bound_of(const BamTerms& terms, const DriveLanes& p, std::size_t lane, double motor,
                 double external, double speed) {
   const auto of = [&](Row row) { return p.of[row][lane]; };
-  double bound = of(kBase) + of(kViscous) * std::abs(speed);
+  double bound = of(row_base) + of(row_viscous) * std::abs(speed);
   if (terms.load)
-    bound += terms.directional ? std::abs(of(kExternal) * external - of(kMotor) * motor)
-                               : of(kLoad) * std::abs(external - motor);
+    bound += terms.directional ? std::abs(of(row_external) * external - of(row_motor) * motor)
+                               : of(row_load) * std::abs(external - motor);
   if (!terms.stribeck) return bound;
-  double at_rest = of(kStribeck);
+  double at_rest = of(row_stribeck);
   if (terms.load)
     at_rest += terms.directional
-                   ? std::abs(of(kExternalStribeck) * external - of(kMotorStribeck) * motor)
-                   : of(kLoadStribeck) * std::abs(external - motor);
+                   ? std::abs(of(row_external_stribeck) * external - of(row_motor_stribeck) * motor)
+                   : of(row_load_stribeck) * std::abs(external - motor);
   if (terms.quadratic && external * motor < 0.0)
-    at_rest += std::abs(motor) > std::abs(external) ? of(kExternalQuad) * external * external
-                                                    : of(kMotorQuad) * motor * motor;
-  return bound + at_rest * std::exp(-std::pow(std::abs(speed) / of(kSpeed), of(kAlpha)));
+    at_rest += std::abs(motor) > std::abs(external) ? of(row_external_quad) * external * external
+                                                    : of(row_motor_quad) * motor * motor;
+  return bound + at_rest * std::exp(-std::pow(std::abs(speed) / of(row_speed), of(row_alpha)));
 }
 
 }  // namespace
@@ -93,13 +93,14 @@ std::span<const BamParameter> bam_parameters() { return kBamParameters; }
 
 std::vector<std::size_t> bam_rows(BamModel model) {
   const BamTerms& terms = kTerms[static_cast<std::size_t>(model)];
-  std::vector<std::size_t> rows{kKt, kR, kArmature, kOffset, kBase, kViscous};
+  std::vector<std::size_t> rows{row_kt,     row_resistance, row_armature,
+                                row_offset, row_base,       row_viscous};
   const auto add = [&](std::initializer_list<std::size_t> more) { rows.insert(rows.end(), more); };
-  if (terms.stribeck) add({kStribeck, kSpeed, kAlpha});
-  if (terms.load && !terms.directional) add({kLoad});
-  if (terms.load && terms.stribeck && !terms.directional) add({kLoadStribeck});
-  if (terms.directional) add({kMotor, kExternal, kMotorStribeck, kExternalStribeck});
-  if (terms.quadratic) add({kMotorQuad, kExternalQuad});
+  if (terms.stribeck) add({row_stribeck, row_speed, row_alpha});
+  if (terms.load && !terms.directional) add({row_load});
+  if (terms.load && terms.stribeck && !terms.directional) add({row_load_stribeck});
+  if (terms.directional) add({row_motor, row_external, row_motor_stribeck, row_external_stribeck});
+  if (terms.quadratic) add({row_motor_quad, row_external_quad});
   return rows;
 }
 
@@ -112,15 +113,17 @@ void roll_out_bam(BamModel model, const DriveLog& log, const DriveRun& run,
     const auto of = [&](Row row) { return parameters.of[row][lane]; };
     double angle = run.angle_rad;
     double speed = run.speed_rad_s;
-    const double inertia = load.inertia_kg_m2 + of(kArmature);
+    const double inertia = load.inertia_kg_m2 + of(row_armature);
     for (std::size_t n = 0; n < run.samples; ++n) {
       angle_rad[n * kDriveLanes + lane] = angle;
       const std::size_t sample = run.first + n;
-      const double external = -load.gravity_Nm * std::sin(angle + load.zero_rad + of(kOffset));
+      const double external = -load.gravity_Nm * std::sin(angle + load.zero_rad + of(row_offset));
       const double duty =
           std::clamp(log.gain * (log.command[sample] - angle), -log.limit, log.limit);
       const bool is_on = log.enabled.empty() || log.enabled[sample] != 0.0;
-      const double motor = is_on ? of(kKt) / of(kR) * (log.supply_V * duty - of(kKt) * speed) : 0.0;
+      const double motor =
+          is_on ? of(row_kt) / of(row_resistance) * (log.supply_V * duty - of(row_kt) * speed)
+                : 0.0;
       const double stopping = inertia / dt * speed + motor + external;
       const double bound = bound_of(terms, parameters, lane, motor, external, speed);
       const double acceleration =

@@ -115,7 +115,7 @@ ChosenStructure choose_structure(const GroupedLogs& logs, const DriveTerms& larg
                            .mae_rad = chosen.held_out.mae_rad,
                            .is_taken = true});
   double least = chosen.held_out.mae_rad;
-  while (removable(chosen.held_out.terms).size() > 0) {
+  while (!removable(chosen.held_out.terms).empty()) {
     const HeldOutStructure& now = chosen.held_out;
     const std::vector<DriveTerm> candidates = cheapest(logs, now, options, threads);
     std::vector<HeldOutStructure> trials(candidates.size());

@@ -224,6 +224,7 @@ void check_temperature(const std::vector<Recording>& recordings, const std::vect
   }
   if (range.size() < 3) return;
   std::vector<double> middles;
+  middles.reserve(range.size());
   for (const auto& [gain, ends] : range) middles.push_back(0.5 * (ends.first + ends.second));
   if (!std::ranges::is_sorted(middles) && !std::ranges::is_sorted(middles, std::greater<>()))
     return;
@@ -261,7 +262,7 @@ double amplitude(std::span<const double> values, std::size_t stride, double phas
   for (std::size_t n = 0; n < count; ++n) mean += values[n * stride] / static_cast<double>(count);
   std::complex<double> sum;
   for (std::size_t n = 0; n < count; ++n) {
-    const double at = static_cast<double>(n);
+    const auto at = static_cast<double>(n);
     const double window =
         0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * at / static_cast<double>(count));
     sum += std::polar(window * (values[n * stride] - mean), -phase_step * at);

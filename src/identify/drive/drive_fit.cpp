@@ -19,7 +19,7 @@ bool has_winding(CommandKind kind) {
 bool is_searched(const DriveParameterInfo& info, const DriveTerms& terms, CommandKind kind) {
   if (!has(terms, info.term)) return false;
   if (info.parameter == DriveParameter::torque_constant)
-    return has_winding(kind) || kind == CommandKind::current_A;
+    return has_winding(kind) || kind == CommandKind::current;
   if (info.parameter == DriveParameter::resistance) return has_winding(kind);
   return true;
 }
@@ -73,7 +73,7 @@ DriveValues typical_values(const DriveLogs& logs, const DriveTerms& terms) {
   const double torque = scales.torque_Nm;
   const double speed = scales.speed_rad_s;
   DriveValues all = neutral_drive_values();
-  if (logs.front()->kind == CommandKind::current_A) {
+  if (logs.front()->kind == CommandKind::current) {
     at(all, torque_constant) = torque / scales.command;
   } else {
     at(all, torque_constant) = 0.5 * scales.supply_V / speed;  // twice as fast without load

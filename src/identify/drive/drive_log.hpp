@@ -14,8 +14,8 @@ enum class CommandKind : std::uint8_t {
   goal_to_duty,    ///< duty = gain (goal - angle), at most `limit`
   goal_to_torque,  ///< torque = gain (goal - angle) - speed_gain angle', at most `limit`
   duty,
-  current_A,
-  torque_Nm,
+  current,  ///< [A]
+  torque,   ///< [Nm]
 };
 
 /// One recording as the free runs need it; the angle is that of the motor after the gear, or of the joint.

@@ -102,8 +102,8 @@ void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log)
       if (channel.ends_with("_V"))
         for (double& value : log.command) value /= log.supply_V;
       return;
-    case DriveLaw::current: log.kind = CommandKind::current_A; return;
-    case DriveLaw::torque: log.kind = CommandKind::torque_Nm; return;
+    case DriveLaw::current: log.kind = CommandKind::current; return;
+    case DriveLaw::torque: log.kind = CommandKind::torque; return;
   }
 }
 
@@ -216,6 +216,7 @@ std::vector<std::string> values_of(const std::vector<Recording>& recordings,
 std::vector<std::string> drive_groups(const std::vector<Recording>& recordings,
                                       const std::string& group_by) {
   std::vector<std::string> own;
+  own.reserve(recordings.size());
   for (const Recording& recording : recordings) own.push_back(recording.name());
   if (!group_by.empty() && group_by != "recording") {
     std::vector<std::string> values = values_of(recordings, group_by);

@@ -1,6 +1,7 @@
 #include "identify/drive/drive_rollout.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 
@@ -85,7 +86,6 @@ class Rollout {
     filtered_speed_ = speed_;
     joint_angle_ = has_spring_ ? hanging_joint() : angle_;
     joint_speed_ = speed_;
-    std::fill(std::begin(ring_), std::end(ring_), 0.0);
   }
 
   HWY_INLINE void run(const RolloutOutput& output) {
@@ -117,7 +117,7 @@ class Rollout {
 
   // The command at a fraction of the period after a sample, between its stamps on straight lines.
   HWY_INLINE V command(std::size_t sample, double fraction) const {
-    const double last = static_cast<double>(log_.size() - 1);
+    const auto last = static_cast<double>(log_.size() - 1);
     const double now = static_cast<double>(sample) + fraction;
     if (!has_delay_ || is_law_delayed_) {
       const double place = std::min(now, last);
@@ -147,7 +147,7 @@ class Rollout {
   // `wanted` as it was one delay ago; from the ring of past values, between them on straight lines.
   HWY_INLINE V delayed(V wanted) {
     constexpr std::size_t kMask = kSlots - 1;
-    hn::Store(wanted, D(), ring_ + (newest_ & kMask) * hn::MaxLanes(D()));
+    hn::Store(wanted, D(), ring_.data() + (newest_ & kMask) * hn::MaxLanes(D()));
     const V age = hn::Mul(of_(DriveParameter::delay), constant(1.0 / step_s_));
     const V steps = hn::Min(hn::Max(age, hn::Zero(D())), constant(static_cast<double>(kSlots - 2)));
     const V whole = hn::Floor(steps);
@@ -158,8 +158,8 @@ class Rollout {
       return hn::Add(hn::Mul(ring, hn::Set(tag, static_cast<std::int64_t>(hn::MaxLanes(D())))),
                      hn::Iota(tag, 0));
     };
-    const V recent = hn::GatherIndex(D(), ring_, slot(whole));
-    const V older = hn::GatherIndex(D(), ring_, slot(hn::Add(whole, constant(1.0))));
+    const V recent = hn::GatherIndex(D(), ring_.data(), slot(whole));
+    const V older = hn::GatherIndex(D(), ring_.data(), slot(hn::Add(whole, constant(1.0))));
     ++newest_;
     return hn::MulAdd(hn::Sub(steps, whole), hn::Sub(older, recent), recent);
   }
@@ -193,9 +193,9 @@ class Rollout {
         const V torque = law_torque(input);
         return is_on_ ? torque : hn::Zero(D());
       }
-      case CommandKind::current_A:
+      case CommandKind::current:
         return is_on_ ? hn::Mul(of_(DriveParameter::torque_constant), input) : hn::Zero(D());
-      case CommandKind::torque_Nm: return is_on_ ? input : hn::Zero(D());
+      case CommandKind::torque: return is_on_ ? input : hn::Zero(D());
     }
     return hn::Zero(D());
   }
@@ -295,7 +295,7 @@ class Rollout {
   V angle_, speed_, filtered_speed_, joint_angle_, joint_speed_;
   V bristle_ = hn::Zero(D()), stop_ = hn::Zero(D()), joint_torque_ = hn::Zero(D());
   std::size_t newest_ = kSlots;
-  HWY_ALIGN double ring_[kSlots * hn::MaxLanes(D())];
+  HWY_ALIGN std::array<double, kSlots * hn::MaxLanes(D())> ring_ = {};
 };
 
 void roll_out_lanes(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,

@@ -261,7 +261,7 @@ DriveSolution search_drive(const DriveProblem& problem, const DriveValues& start
       const auto steps = damped_steps(problem, best.values, evaluation.matrix, evaluation.gradient);
       for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, steps[lane]);
       const auto costs = evaluation.costs(lanes);
-      const auto least = std::min_element(costs.begin(), costs.end());
+      const auto* const least = std::min_element(costs.begin(), costs.end());
       ++best.iterations;
       if (!(*least < best.cost)) break;
       const double gain = 1.0 - *least / best.cost;

@@ -127,7 +127,7 @@ TEST(DriveRollouts, AreThoseOfTheEquationsInEachLane) {
 }
 
 TEST(DriveRollouts, KeepTheEnergyOfAnElasticPendulumWithoutFriction) {
-  DriveLog log = test_log(CommandKind::torque_Nm);
+  DriveLog log = test_log(CommandKind::torque);
   for (double& value : log.command) value = 0.0;
   DriveValues values = test_values();
   for (const DriveParameter none : {coulomb, viscous, load_friction, load_stribeck, stribeck,
@@ -149,7 +149,7 @@ TEST(DriveRollouts, KeepTheEnergyOfAnElasticPendulumWithoutFriction) {
 }
 
 TEST(DriveRollouts, OfTwoMassesHaveTheResonanceOfTheSpring) {
-  DriveLog log = test_log(CommandKind::torque_Nm);
+  DriveLog log = test_log(CommandKind::torque);
   log.sample_period_s = 0.001;
   log.command.assign(4000, 0.0);
   log.angle_rad.assign(4000, 0.0);
