@@ -128,7 +128,7 @@ bool BamEvents::key(string_t& name) {
   if (depth_ > kEntry || (depth_ > kHeader && !is_in_entries_)) return true;
   key_ = name;
   if (depth_ != kEntry) return true;
-  const auto at = std::ranges::find(kBamFields, std::string_view(name), &BamField::key);
+  const auto* const at = std::ranges::find(kBamFields, std::string_view(name), &BamField::key);
   field_.reset();
   if (at == kBamFields.end()) {
     if (other_names.insert(name).second) budget_.keep(name.size() + sizeof(std::string));
@@ -192,7 +192,7 @@ bool BamEvents::number(double value, std::string_view word) {
   if (depth_ == 0) throw Error({.place = budget_.name(), .expected = kBamLayout, .found = found});
   if (depth_ != kHeader) return true;
   if (key_ == "entries") refuse("a list", found);
-  const auto fact = std::ranges::find(kBamFacts, std::string_view(key_), &BamFact::key);
+  const auto* const fact = std::ranges::find(kBamFacts, std::string_view(key_), &BamFact::key);
   if (fact == kBamFacts.end()) return true;
   if (!word.empty()) refuse("a number", found);
   const std::string name(fact->condition);
@@ -282,7 +282,7 @@ std::string label_of(const BamEvents& events, std::string_view name) {
 
 /// "sin_sin_kp400"; empty where the log has no trajectory.
 std::string name_of_run(const BamEvents& events) {
-  const std::string trajectory = label_of(events, "trajectory");
+  std::string trajectory = label_of(events, "trajectory");
   const auto kp =
       std::ranges::find(events.conditions, "kp_1", &std::pair<std::string, double>::first);
   if (trajectory.empty() || kp == events.conditions.end()) return trajectory;

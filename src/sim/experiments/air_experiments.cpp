@@ -64,16 +64,16 @@ using GoalAngle = std::function<double()>;
 
 /// Every octave has the same length.
 GoalAngle chirp_goal(const ExperimentSpec& spec, double amplitude_rad, double duration_s) {
-  const auto [lowest_Hz, highest_Hz] = band(spec);
+  const Band of = band(spec);
   LogSweep sweep({.amplitude = amplitude_rad,
-                  .start_Hz = lowest_Hz,
-                  .end_Hz = highest_Hz,
+                  .start_Hz = of.lowest_Hz,
+                  .end_Hz = of.highest_Hz,
                   .duration_s = duration_s},
                  kBenchRate_Hz);
-  return [=, octaves = std::log(highest_Hz / lowest_Hz),
+  return [=, octaves = std::log(of.highest_Hz / of.lowest_Hz),
           clock = detail::SampleClock(kBenchRate_Hz)]() mutable {
     const double passed = std::min(clock.next_s() / duration_s, 1.0);
-    return share_at(lowest_Hz * std::exp(octaves * passed)) * sweep.step();
+    return share_at(of.lowest_Hz * std::exp(octaves * passed)) * sweep.step();
   };
 }
 
