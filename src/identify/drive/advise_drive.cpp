@@ -23,8 +23,7 @@ struct CandidateLog {
 
 /// The identified drive's angle becomes that of the log, from `start` on.
 DriveLog simulated(DriveLog log, const DriveIdentification& identified, const DriveRun& start) {
-  DriveLanes lanes{};
-  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, identified.values);
+  DriveLanes lanes = DriveLanes::all(identified.values);
   detail::AlignedVector<double> angles(log.size() * kDriveLanes);
   roll_out(log, start, lanes, {identified.terms, identified.step_s}, {.angle_rad = angles.data()});
   for (std::size_t n = 0; n < log.size(); ++n) log.angle_rad[n] = angles[n * kDriveLanes];
@@ -95,13 +94,13 @@ std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
   logs.reserve(recordings.size());
   for (const Recording& recording : recordings)
     logs.push_back(drive_log(recording, identified.load, identified.drive));
-  DriveLogs all;
-  for (const DriveLog& log : logs) all.push_back(&log);
+  const DriveLogs all = pointers_to(logs);
   const DriveFitOptions options{.step_s = identified.step_s};
   Eigen::MatrixXd before = matrix_of(all, identified, options);
   // What no recording moves has a finite variance all the same.
   before.diagonal().array() += 1e-9 * std::max(before.diagonal().maxCoeff(), 1e-300);
-  const Eigen::VectorXd variance = before.inverse().diagonal();
+  const Eigen::MatrixXd covariance = before.inverse();
+  const Eigen::VectorXd variance = covariance.diagonal();
 
   // The recording that moves the parameters most is the one to vary.
   std::size_t strongest = 0;
@@ -109,7 +108,7 @@ std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
   std::vector<Eigen::MatrixXd> own;
   for (std::size_t k = 0; k < logs.size(); ++k) {
     own.push_back(matrix_of({&logs[k]}, identified, options));
-    const double gain = (before.inverse() * own.back()).trace();
+    const double gain = (covariance * own.back()).trace();
     if (gain > most) {
       most = gain;
       strongest = k;

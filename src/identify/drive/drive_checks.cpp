@@ -278,8 +278,7 @@ struct MissedPeak {
 };
 
 void find_peak(const DriveLog& log, const DriveIdentification& identified, MissedPeak& worst) {
-  DriveLanes lanes{};
-  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, identified.values);
+  DriveLanes lanes = DriveLanes::all(identified.values);
   detail::AlignedVector<double> angles(log.size() * kDriveLanes);
   roll_out(log, run_from(log, 0, log.size()), lanes, {identified.terms, identified.step_s},
            {.angle_rad = angles.data()});

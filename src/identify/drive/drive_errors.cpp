@@ -103,8 +103,7 @@ void set_errors(const SearchedDriveParameter& searched, double variance, double 
 std::vector<IdentifiedDriveParameter> parameters_with_errors(
     const std::vector<DriveLog>& logs, const DriveTerms& terms, const DriveValues& values,
     bool wants_errors, const DriveFitOptions& options, std::size_t threads) {
-  DriveLogs all;
-  for (const DriveLog& log : logs) all.push_back(&log);
+  const DriveLogs all = pointers_to(logs);
   const DriveProblem problem = drive_problem(all, terms, options);
   std::vector<double> variances;
   std::vector<double> load_variances;

@@ -212,6 +212,13 @@ DriveSolution fit_problem(const DriveProblem& problem, const DriveValues& typica
   return best;
 }
 
+DriveLogs pointers_to(const std::vector<DriveLog>& logs) {
+  DriveLogs all;
+  all.reserve(logs.size());
+  for (const DriveLog& log : logs) all.push_back(&log);
+  return all;
+}
+
 double drive_step_s(const DriveTerms& terms, const DriveFitOptions& options) {
   if (options.step_s > 0.0) return options.step_s;
   return has(terms, DriveTerm::spring) ? 0.001 : 0.0025;

@@ -12,6 +12,7 @@
 namespace torsio {
 
 using DriveLogs = std::vector<const DriveLog*>;
+[[nodiscard]] DriveLogs pointers_to(const std::vector<DriveLog>& logs);
 
 struct DriveFitOptions {
   std::size_t starts = 3;

@@ -13,6 +13,13 @@ inline constexpr std::size_t kDriveLanes = 16;
 struct alignas(64) DriveLanes {
   std::array<std::array<double, kDriveLanes>, kDriveParameters> of;
 
+  /// One set of parameters in every lane.
+  [[nodiscard]] static DriveLanes all(const DriveValues& values) {
+    DriveLanes lanes{};
+    for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, values);
+    return lanes;
+  }
+
   void set(std::size_t lane, const DriveValues& values) {
     for (std::size_t p = 0; p < kDriveParameters; ++p) of[p][lane] = values[p];
   }

@@ -121,8 +121,7 @@ class Evaluation {
 
   void differentiate(const DriveValues& values, double by, std::size_t from, std::size_t part,
                      std::size_t count) {
-    DriveLanes lanes{};
-    for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, values);
+    DriveLanes lanes = DriveLanes::all(values);
     std::array<double, kDriveLanes> inverse_step{};
     for (std::size_t k = 0; k < part; ++k) {
       const SearchedDriveParameter& parameter = problem_.searched[from + k];
@@ -249,8 +248,7 @@ DriveSolution search_drive(const DriveProblem& problem, const DriveValues& start
                            std::size_t max_iterations, const Progress& progress) {
   Evaluation evaluation(problem, cost);
   DriveSolution best{.values = start};
-  DriveLanes lanes{};
-  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, start);
+  DriveLanes lanes = DriveLanes::all(start);
   best.cost = evaluation.costs(lanes)[0];
   constexpr double kWorthwhile = 1e-3;
   for (const double by : differences) {
@@ -275,8 +273,7 @@ DriveSolution search_drive(const DriveProblem& problem, const DriveValues& start
 
 DriveScore score_drive(const DriveProblem& problem, const DriveValues& values) {
   DriveScore score;
-  DriveLanes lanes{};
-  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, values);
+  DriveLanes lanes = DriveLanes::all(values);
   detail::AlignedVector<double> angles;
   double squares = 0.0;
   for (const DriveLog* log : problem.logs) {

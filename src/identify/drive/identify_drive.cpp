@@ -111,8 +111,7 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
                             .step_s = options.step_s,
                             .progress = options.progress};
   const DriveTerms largest = largest_terms(options, load, logs.front().kind);
-  DriveLogs pointers;
-  for (const DriveLog& log : logs) pointers.push_back(&log);
+  const DriveLogs pointers = pointers_to(logs);
   const GroupedLogs all = grouped(pointers);
   identified.groups = all.groups;
   identified.terms = largest;
@@ -151,8 +150,7 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
 
 DriveTrace simulate_drive(const DriveIdentification& identified, const Recording& recording) {
   const DriveLog log = drive_log(recording, identified.load, identified.drive);
-  DriveLanes lanes{};
-  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) lanes.set(lane, identified.values);
+  DriveLanes lanes = DriveLanes::all(identified.values);
   detail::AlignedVector<double> angle(log.size() * kDriveLanes);
   detail::AlignedVector<double> joint(log.size() * kDriveLanes);
   detail::AlignedVector<double> torque(log.size() * kDriveLanes);

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "data/names.hpp"
 #include "identify/drive/bam_rollout.hpp"
 #include "identify/drive/choose_structure.hpp"
 #include "identify/drive/drive_fit.hpp"
 #include "identify/drive/drive_logs.hpp"
-#include "joint_load/load_fact.hpp"
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
 
@@ -19,7 +19,6 @@ namespace torsio {
 namespace {
 
 constexpr std::array<std::string_view, 3> kTargetNames{"bam", "mjcf", "isaaclab"};
-constexpr double kGravity_m_s2 = 9.80665;
 
 std::vector<DriveLog> grouped_logs(const DriveIdentification& identified,
                                    const std::vector<Recording>& recordings) {
@@ -30,12 +29,6 @@ std::vector<DriveLog> grouped_logs(const DriveIdentification& identified,
     logs.back().group = identified.recordings[k].group;
   }
   return logs;
-}
-
-DriveLogs pointers_to(const std::vector<DriveLog>& logs) {
-  DriveLogs all;
-  for (const DriveLog& log : logs) all.push_back(&log);
-  return all;
 }
 
 DriveFitOptions fit_options(const IdentifyOptions& options) {
@@ -78,9 +71,7 @@ std::vector<std::string> other_terms(const DriveTerms& terms, const DriveTerms& 
 }
 
 std::string joined_terms(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& term : names) text += (text.empty() ? "" : ", ") + term;
-  return text.empty() ? "nothing" : text;
+  return names.empty() ? "nothing" : joined(names);
 }
 
 WrittenDrive write_bam(const DriveIdentification& identified, const std::vector<DriveLog>& logs,
@@ -168,12 +159,12 @@ void require_servo(DriveTarget target, const DriveLog& log) {
 
 /// A body of the load's gravity and inertia: a mass on half the length that its inertia as a point would have.
 std::string load_body(const JointLoad& load, double zero_rad) {
-  const double first_moment_kg_m = load.gravity_Nm / kGravity_m_s2;
+  const double first_moment_kg_m = load.gravity_Nm / kLoadGravity_m_s2;
   const double arm_m = first_moment_kg_m > 0.0 ? 0.5 * load.inertia_kg_m2 / first_moment_kg_m : 0.0;
   const double mass_kg = arm_m > 0.0 ? first_moment_kg_m / arm_m : 1e-3;
   const double own = load.inertia_kg_m2 - mass_kg * arm_m * arm_m;
   return fmt::format(
-      "<inertial pos=\"{:.9g} 0 {:.9g}\" mass=\"{:.9g}\" diaginertia=\"{:.9g} {:.9g} {:.9g}\"/>",
+      R"(<inertial pos="{:.9g} 0 {:.9g}" mass="{:.9g}" diaginertia="{:.9g} {:.9g} {:.9g}"/>)",
       -arm_m * std::sin(zero_rad), -arm_m * std::cos(zero_rad), mass_kg, own, own, own);
 }
 
@@ -211,7 +202,7 @@ WrittenDrive write_mjcf(const DriveIdentification& identified, const std::vector
       "<mujoco model=\"{}\">\n  <option timestep=\"{:.9g}\" integrator=\"Euler\" gravity=\"0 0 "
       "-{}\"/>\n"
       "  <worldbody>\n    <body name=\"{}_motor\">\n",
-      actuator, fit.step_s, kGravity_m_s2, actuator);
+      actuator, fit.step_s, kLoadGravity_m_s2, actuator);
   const std::string motor_joint = fmt::format(
       "<joint name=\"{}_{}\" type=\"hinge\" axis=\"0 1 0\" armature=\"{:.9g}\" damping=\"{:.9g}\" "
       "frictionloss=\"{:.9g}\"/>",
@@ -237,7 +228,7 @@ WrittenDrive write_mjcf(const DriveIdentification& identified, const std::vector
       "gainprm=\"{:.9g}\" biasprm=\"0 {:.9g} {:.9g}\"{}/>\n  </actuator>\n</mujoco>\n",
       actuator, actuator, has_spring ? "motor" : "joint", gains.stiffness_Nm_rad,
       -gains.stiffness_Nm_rad, -law_damping,
-      gains.limit_Nm < 1e8 ? fmt::format(" forcelimited=\"true\" forcerange=\"{:.9g} {:.9g}\"",
+      gains.limit_Nm < 1e8 ? fmt::format(R"( forcelimited="true" forcerange="{:.9g} {:.9g}")",
                                          -gains.limit_Nm, gains.limit_Nm)
                            : std::string());
   return written;
