@@ -10,7 +10,17 @@ namespace torsio {
 namespace {
 
 constexpr std::array<double, 3> kDifferences{0.03, 0.01, 0.003};
-constexpr double kPriorShare = 0.03;  // share of the loss
+
+/// Weight of the prior as a share of the loss. What a second mass does to the motor's encoder is small: there it is
+/// smaller.
+double prior_share(const DriveProblem& problem) {
+  constexpr double kRigid = 0.03;
+  constexpr double kElastic = 0.003;
+  const bool is_elastic = std::ranges::any_of(problem.searched, [](const auto& parameter) {
+    return parameter.index == static_cast<std::size_t>(DriveParameter::stiffness);
+  });
+  return is_elastic ? kElastic : kRigid;
+}
 
 bool has_winding(CommandKind kind) {
   return kind == CommandKind::goal_to_duty || kind == CommandKind::duty;
@@ -88,6 +98,8 @@ DriveValues typical_values(const DriveLogs& logs, const DriveTerms& terms) {
   at(all, stribeck) = 0.02 * torque;
   at(all, stribeck_speed) = 0.1 * speed;
   at(all, resistance_rise) = 0.1 * at(all, resistance);
+  at(all, no_load_speed) = 1.2 * speed;
+  at(all, stall_torque) = 10.0 * torque;
   at(all, joint_inertia) = 0.1 * scales.inertia_kg_m2;
   constexpr double kStiff_rad_s = 30.0;  // natural frequency of the load on the spring
   at(all, stiffness) = scales.inertia_kg_m2 * kStiff_rad_s * kStiff_rad_s;
@@ -95,8 +107,8 @@ DriveValues typical_values(const DriveLogs& logs, const DriveTerms& terms) {
   at(all, hysteresis) = 0.02 * torque;
   at(all, hysteresis_width) = 0.3 * torque / at(all, stiffness);
   at(all, backlash) = 0.02 * torque / at(all, stiffness);
-  at(all, bearing) = 0.01 * torque;
-  at(all, bearing_viscous) = 0.005 * torque / speed;
+  at(all, bearing) = 0.02 * torque;
+  at(all, bearing_viscous) = 0.02 * torque / speed;
   at(all, presliding) = 1e-3;
   DriveValues values = neutral_drive_values();
   for (const DriveParameterInfo& info : drive_parameters())
@@ -115,7 +127,7 @@ DriveSolution descend(const DriveProblem& problem, const DriveValues& start, dou
                       const Progress& progress) {
   DriveSolution best{.values = start, .cost = loss_of(problem, start, window_s)};
   for (int pass = 0; pass < 2; ++pass) {
-    const DriveCost cost{.window_s = window_s, .prior_weight = kPriorShare * best.cost};
+    const DriveCost cost{.window_s = window_s, .prior_weight = prior_share(problem) * best.cost};
     if (!std::isfinite(best.cost)) break;
     const DriveSolution found =
         search_drive(problem, best.values, cost, differences, iterations, progress);
@@ -143,33 +155,45 @@ DriveSolution better(const DriveSolution& a, const DriveSolution& b) {
   return b.cost < a.cost ? b : a;
 }
 
+/// The motors that a search over springs begins with: typical ones and the best rigid one, lighter and heavier. Where the
+/// joint's own inertia is searched for, a share of the inertia moves from the motor's side to the joint's.
+std::vector<DriveValues> motor_starts(const DriveProblem& problem, const DriveValues& typical,
+                                      const DriveValues& one_mass, double motor_share) {
+  using enum DriveParameter;
+  std::vector<DriveValues> motors;
+  for (const DriveValues* motor : {&typical, &one_mass})
+    for (const double inertia : {0.4, 1.0, 2.5}) {
+      DriveValues values = typical;
+      for (const SearchedDriveParameter& parameter : problem.searched)
+        if (drive_parameters()[parameter.index].term <= DriveTerm::direction)
+          values[parameter.index] = (*motor)[parameter.index];
+      at(values, armature) *= inertia;
+      if (motor_share < 1.0) at(values, joint_inertia) = (1.0 - motor_share) * at(values, armature);
+      at(values, armature) *= motor_share;
+      motors.push_back(values);
+    }
+  return motors;
+}
+
 /// A guess of the spring over three decades, each with the best of several motors: a search from one stiffness stays at
 /// its resonance.
 std::vector<DriveValues> spring_starts(const DriveProblem& problem, const DriveValues& typical,
-                                       const DriveValues& one_mass) {
+                                       const DriveValues& one_mass, double motor_share) {
   using enum DriveParameter;
   constexpr int kStiffnesses = 16;
-  constexpr std::array kInertias{0.4, 1.0, 2.5};
   std::vector<DriveValues> starts;
   for (int k = 0; k < kStiffnesses; ++k) {
     const double factor = std::pow(10.0, -1.5 + 3.0 * k / (kStiffnesses - 1));
-    std::vector<DriveValues> motors;
-    for (const DriveValues* motor : {&typical, &one_mass})
-      for (const double inertia : kInertias) {
-        DriveValues values = typical;
-        for (const SearchedDriveParameter& parameter : problem.searched)
-          if (drive_parameters()[parameter.index].term <= DriveTerm::direction)
-            values[parameter.index] = (*motor)[parameter.index];
-        at(values, armature) *= inertia;
-        at(values, stiffness) *= factor;
-        at(values, spring_damping) *= std::sqrt(factor);
-        at(values, hysteresis_width) /= factor;
-        at(values, backlash) /= factor;
-        for (const SearchedDriveParameter& parameter : problem.searched)
-          values[parameter.index] =
-              std::clamp(values[parameter.index], parameter.lowest, parameter.highest);
-        motors.push_back(values);
-      }
+    std::vector<DriveValues> motors = motor_starts(problem, typical, one_mass, motor_share);
+    for (DriveValues& values : motors) {
+      at(values, stiffness) *= factor;
+      at(values, spring_damping) *= std::sqrt(factor);
+      at(values, hysteresis_width) /= factor;
+      at(values, backlash) /= factor;
+      for (const SearchedDriveParameter& parameter : problem.searched)
+        values[parameter.index] =
+            std::clamp(values[parameter.index], parameter.lowest, parameter.highest);
+    }
     const std::vector<double> costs = costs_of(problem, motors, {});
     starts.push_back(
         motors[static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin())]);
@@ -186,9 +210,12 @@ DriveSolution fit_two_masses(const DriveProblem& problem, const DriveLogs& logs,
   const DriveSolution stiff = fit_drive(logs, one, quick);
   constexpr std::size_t kFirstIterations = 5;
   std::vector<DriveSolution> near;
-  for (const DriveValues& start : spring_starts(problem, typical, stiff.values))
-    near.push_back(search_drive(problem, start, {}, std::span(kDifferences).first(1),
-                                kFirstIterations, options.progress));
+  std::vector<double> motor_shares{1.0};
+  if (has(terms, DriveTerm::joint_inertia)) motor_shares = {0.9, 0.6, 0.3};
+  for (const double share : motor_shares)
+    for (const DriveValues& start : spring_starts(problem, typical, stiff.values, share))
+      near.push_back(search_drive(problem, start, {}, std::span(kDifferences).first(1),
+                                  kFirstIterations, options.progress));
   std::ranges::stable_sort(near, {}, &DriveSolution::cost);
   DriveSolution best{.values = typical, .cost = HUGE_VAL};
   for (std::size_t k = 0; k < std::min(std::max<std::size_t>(options.starts, 1), near.size()); ++k)
@@ -228,6 +255,8 @@ DriveTerms possible_terms(CommandKind kind, bool has_spring, bool fits_joint_ine
   using enum DriveTerm;
   DriveTerms terms = drive_terms({base, delay, load_friction, load_stribeck, stribeck});
   if (has_winding(kind)) terms |= drive_terms({resistance_rise, duty_exponent});
+  if (kind == CommandKind::goal_to_torque || kind == CommandKind::torque)
+    terms |= drive_terms({speed_limit});
   if (has_spring) {
     terms |= drive_terms({spring, hysteresis, backlash, bearing, presliding});
     if (fits_joint_inertia) terms |= drive_terms({joint_inertia});

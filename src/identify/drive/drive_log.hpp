@@ -25,6 +25,8 @@ struct DriveLog {
   double sample_period_s = 0.0;
   CommandKind kind = CommandKind::goal_to_duty;
   std::vector<double> command;
+  /// Where the command of each sample has gone just before the next one, on a straight line; empty: to the next value.
+  std::vector<double> command_end;
   std::vector<double> angle_rad;
   std::vector<double> enabled;  ///< 1 or 0, a row per sample; empty: always 1
   double gain = 0.0;

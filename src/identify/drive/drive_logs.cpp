@@ -107,6 +107,23 @@ void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log)
   }
 }
 
+/// A command that jumps between two samples keeps its value until the second one; others go there on a straight line.
+std::vector<double> ends_of_commands(const std::vector<double>& command) {
+  constexpr double kOfRange = 0.02;
+  constexpr double kOfNeighbours = 5.0;
+  const auto [low, high] = std::ranges::minmax(command);
+  const auto change = [&](std::size_t n) {
+    return n + 1 < command.size() ? std::abs(command[n + 1] - command[n]) : 0.0;
+  };
+  std::vector<double> ends(command);
+  for (std::size_t n = 0; n + 1 < command.size(); ++n) {
+    const double neighbours = std::max(n > 0 ? change(n - 1) : 0.0, change(n + 1));
+    const bool jumps = change(n) > std::max(kOfRange * (high - low), kOfNeighbours * neighbours);
+    if (!jumps) ends[n] = command[n + 1];
+  }
+  return ends;
+}
+
 }  // namespace
 
 std::string angle_channel(const Recording& recording, const DriveSheet& drive) {
@@ -138,6 +155,7 @@ DriveLog drive_log(const Recording& recording, const LoadSheet& load, const Driv
     for (double& value : log.angle_rad) value /= ratio;
   }
   set_law(recording, drive, log);
+  log.command_end = ends_of_commands(log.command);
   if (recording.has("enabled_1")) log.enabled = finite_channel(recording, "enabled_1");
   log.load = known_load(load, recording);
   return log;

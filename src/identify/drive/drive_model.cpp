@@ -30,6 +30,10 @@ constexpr std::array<DriveParameterInfo, kDriveParameters> kParameters{{
      "further resistance at full duty", 0.0, 1e-3, 50.0, true},
     {duty_exponent, Term::duty_exponent, "duty_exponent_1", "exponent of the duty", 1.0, 0.3, 3.0,
      true},
+    {no_load_speed, Term::speed_limit, "no_load_speed_rad_s",
+     "speed at which the supply leaves no torque", 1e6, 0.05, 1e3, true},
+    {stall_torque, Term::speed_limit, "stall_torque_Nm", "torque that the supply can give at rest",
+     1e6, 0.05, 1e5, true},
     {direction, Term::direction, "direction_1",
      "share by which the motor's torque counts more as load than gravity's", 0.0, -1.0, 1.0, false},
     {joint_inertia, Term::joint_inertia, "joint_inertia_kg_m2", "inertia of the joint's output",
@@ -51,9 +55,9 @@ constexpr std::array<DriveParameterInfo, kDriveParameters> kParameters{{
 }};
 
 constexpr std::array<std::string_view, kDriveTerms> kTermNames{
-    "base",          "delay",     "load_friction", "load_stribeck", "stribeck",   "resistance_rise",
-    "duty_exponent", "direction", "joint_inertia", "spring",        "hysteresis", "backlash",
-    "bearing",       "presliding"};
+    "base",          "delay",       "load_friction", "load_stribeck", "stribeck", "resistance_rise",
+    "duty_exponent", "speed_limit", "direction",     "joint_inertia", "spring",   "hysteresis",
+    "backlash",      "bearing",     "presliding"};
 
 }  // namespace
 

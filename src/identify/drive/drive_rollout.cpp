@@ -55,11 +55,13 @@ class Rollout {
     has_stribeck_ = has(options.terms, stribeck);
     has_rise_ = has(options.terms, resistance_rise);
     has_exponent_ = has(options.terms, duty_exponent);
+    has_speed_limit_ = has(options.terms, speed_limit);
     has_spring_ = has(options.terms, spring);
     has_hysteresis_ = has(options.terms, hysteresis);
     has_backlash_ = has(options.terms, backlash);
     has_presliding_ = has(options.terms, presliding);
     is_law_delayed_ = log.kind == CommandKind::goal_to_torque;
+    command_end_ = log.command_end.empty() ? log.command.data() + 1 : log.command_end.data();
     substeps_ = static_cast<std::size_t>(std::ceil(log.sample_period_s / options.step_s - 1e-6));
     substeps_ = std::max<std::size_t>(substeps_, 1);
     step_s_ = log.sample_period_s / static_cast<double>(substeps_);
@@ -73,6 +75,8 @@ class Rollout {
     momentum_ = hn::Div(moved, constant(step_s_));
     joint_inverse_inertia_ = hn::Div(constant(1.0), load);
     joint_momentum_ = hn::Div(load, constant(step_s_));
+    if (has_speed_limit_)
+      speed_slope_ = hn::Div(of_(DriveParameter::stall_torque), of_(DriveParameter::no_load_speed));
     inverse_load_speed_ = hn::Div(constant(1.0), of_(DriveParameter::load_speed));
     inverse_stribeck_speed_ = hn::Div(constant(1.0), of_(DriveParameter::stribeck_speed));
     if (has_hysteresis_)
@@ -115,7 +119,7 @@ class Rollout {
     return joint;
   }
 
-  // The command at a fraction of the period after a sample, between its stamps on straight lines.
+  // The command at a fraction of the period after a sample, between its stamps on straight lines but for jumps.
   HWY_INLINE V command(std::size_t sample, double fraction) const {
     const auto last = static_cast<double>(log_.size() - 1);
     const double now = static_cast<double>(sample) + fraction;
@@ -123,8 +127,7 @@ class Rollout {
       const double place = std::min(now, last);
       const auto below = std::min(static_cast<std::size_t>(place), log_.size() - 2);
       const double share = place - static_cast<double>(below);
-      return constant(log_.command[below] +
-                      share * (log_.command[below + 1] - log_.command[below]));
+      return constant(log_.command[below] + share * (command_end_[below] - log_.command[below]));
     }
     const V delayed = hn::NegMulAdd(of_(DriveParameter::delay),
                                     constant(1.0 / log_.sample_period_s), constant(now));
@@ -132,7 +135,7 @@ class Rollout {
     const V below = hn::Floor(place);
     const auto index = hn::ConvertTo(Index(), below);
     const V left = hn::GatherIndex(D(), log_.command.data(), index);
-    const V right = hn::GatherIndex(D(), log_.command.data() + 1, index);
+    const V right = hn::GatherIndex(D(), command_end_, index);
     return hn::MulAdd(hn::Sub(place, below), hn::Sub(right, left), left);
   }
 
@@ -182,6 +185,14 @@ class Rollout {
     return hn::Mul(constant_Nm_A, hn::Div(voltage, resistance));
   }
 
+  // What the supply leaves of a commanded torque at this speed.
+  HWY_INLINE V within_supply(V torque) const {
+    if (!has_speed_limit_) return torque;
+    const V stall = of_(DriveParameter::stall_torque);
+    const V lost = hn::Mul(speed_slope_, speed_);
+    return hn::Min(hn::Max(torque, hn::Neg(hn::Add(stall, lost))), hn::Sub(stall, lost));
+  }
+
   HWY_INLINE V motor_torque(std::size_t sample, double fraction) {
     const V input = command(sample, fraction);
     switch (log_.kind) {
@@ -191,11 +202,11 @@ class Rollout {
       case CommandKind::duty: return winding_torque(input);
       case CommandKind::goal_to_torque: {
         const V torque = law_torque(input);
-        return is_on_ ? torque : hn::Zero(D());
+        return is_on_ ? within_supply(torque) : hn::Zero(D());
       }
       case CommandKind::current:
         return is_on_ ? hn::Mul(of_(DriveParameter::torque_constant), input) : hn::Zero(D());
-      case CommandKind::torque: return is_on_ ? input : hn::Zero(D());
+      case CommandKind::torque: return is_on_ ? within_supply(input) : hn::Zero(D());
     }
     return hn::Zero(D());
   }
@@ -282,14 +293,16 @@ class Rollout {
   const DriveRun& run_;
   Constants of_;
   std::size_t at_;
+  const double* command_end_;
   bool has_delay_, has_load_, has_load_stribeck_, has_stribeck_, has_rise_, has_exponent_,
-      has_spring_;
+      has_speed_limit_, has_spring_;
   bool has_hysteresis_, has_backlash_, has_presliding_, is_law_delayed_;
   bool is_on_ = true;
   std::size_t substeps_ = 1;
   double step_s_ = 0.0;
   V gravity_, zero_, inverse_inertia_, momentum_, joint_inverse_inertia_, joint_momentum_;
   V inverse_load_speed_, inverse_stribeck_speed_;
+  V speed_slope_ = hn::Zero(D());
   V inverse_width_ = hn::Zero(D()), inverse_presliding_ = hn::Zero(D());
   V speed_share_;
   V angle_, speed_, filtered_speed_, joint_angle_, joint_speed_;

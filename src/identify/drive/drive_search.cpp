@@ -204,27 +204,56 @@ std::array<DriveValues, kDriveLanes> damped_steps(const DriveProblem& problem,
   return steps;
 }
 
-}  // namespace
+/// Least squares around a sample.
+struct Parabola {
+  std::size_t samples = 0;
+  double angle_rad = 0.0;
+  double speed_rad_s = 0.0;
+  double variance = 0.0;  ///< of the angles [rad^2]
+};
 
-DriveRun run_from(const DriveLog& log, std::size_t first, std::size_t samples) {
-  constexpr double kHalf_s = 0.03;
-  const auto half = static_cast<std::size_t>(std::lround(kHalf_s / log.sample_period_s));
-  const std::size_t reach = std::max<std::size_t>(half, 2);
-  const std::size_t begin = first > reach ? first - reach : 0;
-  const std::size_t end = std::min(first + reach + 1, log.size());
-  // Least squares of a parabola around the first sample.
+Parabola parabola_around(const DriveLog& log, std::size_t centre, std::size_t reach) {
+  const std::size_t begin = centre > reach ? centre - reach : 0;
+  const std::size_t end = std::min(centre + reach + 1, log.size());
+  Parabola found{.samples = end - begin};
+  if (found.samples < 4) return found;
+  const auto row = [&](std::size_t n) {
+    const double t =
+        (static_cast<double>(n) - static_cast<double>(centre)) / static_cast<double>(reach);
+    return Eigen::Vector3d(1.0, t, t * t);
+  };
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (std::size_t n = begin; n < end; ++n) {
-    const double t =
-        (static_cast<double>(n) - static_cast<double>(first)) / static_cast<double>(reach);
-    const Eigen::Vector3d row(1.0, t, t * t);
-    matrix += row * row.transpose();
-    right += row * log.angle_rad[n];
+    matrix += row(n) * row(n).transpose();
+    right += row(n) * log.angle_rad[n];
   }
-  if (end - begin < 4) return {first, samples, log.angle_rad[first], 0.0};
   const Eigen::Vector3d fit = matrix.ldlt().solve(right);
-  return {first, samples, fit[0], fit[1] / (static_cast<double>(reach) * log.sample_period_s)};
+  found.angle_rad = fit[0];
+  found.speed_rad_s = fit[1] / (static_cast<double>(reach) * log.sample_period_s);
+  for (std::size_t n = begin; n < end; ++n)
+    found.variance +=
+        std::pow(row(n).dot(fit) - log.angle_rad[n], 2) / static_cast<double>(found.samples - 3);
+  return found;
+}
+
+}  // namespace
+
+DriveRun run_from(const DriveLog& log, std::size_t first, std::size_t samples) {
+  constexpr double kWidest_s = 0.03;
+  constexpr std::size_t kFewestSamples = 8;  // of a narrower window
+  std::size_t reach = std::max<std::size_t>(
+      static_cast<std::size_t>(std::lround(kWidest_s / log.sample_period_s)), 2);
+  Parabola parabola = parabola_around(log, first, reach);
+  if (parabola.samples < 4) return {first, samples, log.angle_rad[first], 0.0};
+  // A motion that begins with a jerk is no parabola over 30 ms.
+  while (true) {
+    reach /= 2;
+    const Parabola narrower = parabola_around(log, first, reach);
+    if (narrower.samples < kFewestSamples || narrower.variance > 0.5 * parabola.variance) break;
+    parabola = narrower;
+  }
+  return {first, samples, parabola.angle_rad, parabola.speed_rad_s};
 }
 
 std::vector<double> costs_of(const DriveProblem& problem, std::span<const DriveValues> candidates,

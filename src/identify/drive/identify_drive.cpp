@@ -86,10 +86,14 @@ void set_nested(const GroupedLogs& all, const DriveTerms& largest, const DriveFi
   }
 }
 
-void set_held_out(const HeldOutStructure& held_out, DriveIdentification& identified) {
+void set_held_out(const GroupedLogs& all, const HeldOutStructure& held_out,
+                  DriveIdentification& identified) {
   identified.held_out_mae_rad = held_out.mae_rad;
-  for (std::size_t k = 0; k < identified.recordings.size(); ++k)
+  identified.held_out_values.clear();
+  for (std::size_t k = 0; k < identified.recordings.size(); ++k) {
     identified.recordings[k].held_out_mae_rad = held_out.mae_of_log_rad[k];
+    identified.held_out_values.push_back(held_out.fits[all.group[k]].values);
+  }
 }
 
 }  // namespace
@@ -119,12 +123,12 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
   if (all.groups > 1) {
     report_progress(options.progress, 0.0, "structure");
     if (options.terms) {
-      set_held_out(hold_out(all, largest, fit, options.threads), identified);
+      set_held_out(all, hold_out(all, largest, fit, options.threads), identified);
     } else {
       ChosenStructure chosen = choose_structure(all, largest, fit, options.threads);
       identified.terms = chosen.held_out.terms;
       identified.trials = std::move(chosen.trials);
-      set_held_out(chosen.held_out, identified);
+      set_held_out(all, chosen.held_out, identified);
       if (options.has_nested_score) set_nested(all, largest, fit, options.threads, identified);
     }
   }

@@ -18,6 +18,8 @@ namespace torsio {
 ///     duty       d  = sgn(d) |d|^duty_exponent
 ///     current    i  = (supply d - kt v) / (R + resistance_rise d^2)
 ///     motor   tau_m = kt i; 0 while the power is off and the winding open
+///             with `speed_limit`, of a law that commands torque: at most stall_torque (1 - v / no_load_speed) forwards,
+///             stall_torque (1 + v / no_load_speed) backwards
 ///     gravity tau_e = -gravity sin(q + zero)
 ///     friction |tau_f| <= coulomb + load_friction L + load_stribeck L exp(-|v| / load_speed)
 ///                         + stribeck exp(-|v| / stribeck_speed) + viscous |v|
@@ -46,6 +48,8 @@ enum class DriveParameter : std::uint8_t {
   stribeck_speed,
   resistance_rise,
   duty_exponent,
+  no_load_speed,
+  stall_torque,
   direction,
   joint_inertia,
   stiffness,
@@ -57,7 +61,7 @@ enum class DriveParameter : std::uint8_t {
   bearing_viscous,
   presliding,
 };
-inline constexpr std::size_t kDriveParameters = 24;
+inline constexpr std::size_t kDriveParameters = 26;
 
 /// What belongs together in the choice of a structure: the parameters of a term are searched for, or none of them.
 enum class DriveTerm : std::uint8_t {
@@ -68,6 +72,7 @@ enum class DriveTerm : std::uint8_t {
   stribeck,
   resistance_rise,
   duty_exponent,
+  speed_limit,  ///< what the supply leaves of the torque at high speed
   direction,
   joint_inertia,
   spring,  ///< second mass: stiffness and damping
@@ -76,7 +81,7 @@ enum class DriveTerm : std::uint8_t {
   bearing,
   presliding,
 };
-inline constexpr std::size_t kDriveTerms = 14;
+inline constexpr std::size_t kDriveTerms = 15;
 
 using DriveTerms = std::bitset<kDriveTerms>;
 
