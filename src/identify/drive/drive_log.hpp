@@ -25,7 +25,7 @@ struct DriveLog {
   double sample_period_s = 0.0;
   CommandKind kind = CommandKind::goal_to_duty;
   std::vector<double> command;
-  /// Where the command of each sample has gone just before the next one, on a straight line; empty: to the next value.
+  /// The command just before the next sample, to which it changes linearly; empty: the next value.
   std::vector<double> command_end;
   std::vector<double> angle_rad;
   std::vector<double> enabled;  ///< 1 or 0, a row per sample; empty: always 1

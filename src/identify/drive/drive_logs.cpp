@@ -107,7 +107,7 @@ void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log)
   }
 }
 
-/// A command that jumps between two samples keeps its value until the second one; others go there on a straight line.
+/// A command that jumps between two samples keeps its value until the second one; others change linearly.
 std::vector<double> ends_of_commands(const std::vector<double>& command) {
   constexpr double kOfRange = 0.02;
   constexpr double kOfNeighbours = 5.0;

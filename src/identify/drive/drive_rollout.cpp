@@ -119,7 +119,7 @@ class Rollout {
     return joint;
   }
 
-  // The command at a fraction of the period after a sample, between its stamps on straight lines but for jumps.
+  // The command at a fraction of the period after a sample, interpolated between its stamps, except where it jumps.
   HWY_INLINE V command(std::size_t sample, double fraction) const {
     const auto last = static_cast<double>(log_.size() - 1);
     const double now = static_cast<double>(sample) + fraction;

@@ -209,7 +209,7 @@ struct Parabola {
   std::size_t samples = 0;
   double angle_rad = 0.0;
   double speed_rad_s = 0.0;
-  double variance = 0.0;  ///< of the angles [rad^2]
+  double variance = 0.0;  ///< mean squared residual [rad^2]
 };
 
 Parabola parabola_around(const DriveLog& log, std::size_t centre, std::size_t reach) {
@@ -241,12 +241,12 @@ Parabola parabola_around(const DriveLog& log, std::size_t centre, std::size_t re
 
 DriveRun run_from(const DriveLog& log, std::size_t first, std::size_t samples) {
   constexpr double kWidest_s = 0.03;
-  constexpr std::size_t kFewestSamples = 8;  // of a narrower window
+  constexpr std::size_t kFewestSamples = 8;  // in a narrower window
   std::size_t reach = std::max<std::size_t>(
       static_cast<std::size_t>(std::lround(kWidest_s / log.sample_period_s)), 2);
   Parabola parabola = parabola_around(log, first, reach);
   if (parabola.samples < 4) return {first, samples, log.angle_rad[first], 0.0};
-  // A motion that begins with a jerk is no parabola over 30 ms.
+  // A parabola over 30 ms does not fit a motion that begins with a jerk.
   while (true) {
     reach /= 2;
     const Parabola narrower = parabola_around(log, first, reach);
