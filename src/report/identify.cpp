@@ -24,7 +24,20 @@ std::string angle_text(double value_rad) {
   return std::isfinite(value_rad) ? fmt::format("{:.4f}", value_rad) : "-";
 }
 
-std::string parameter_table(const DriveIdentification& identified) {
+std::string structure_text(const DriveIdentification& identified) {
+  if (identified.trials.empty())
+    return fmt::format("terms beyond the base: {} (stated)\n", terms_text(identified.terms));
+  std::string steps;
+  for (const StructureTrial& trial : identified.trials)
+    if (trial.is_taken)
+      steps += fmt::format("{}{} {:.4f}", steps.empty() ? "" : ", ", trial.change, trial.mae_rad);
+  return fmt::format("terms beyond the base: {} (chosen by held-out error in rad: {})\n",
+                     terms_text(identified.terms), steps);
+}
+
+}  // namespace
+
+TextTable drive_parameter_table(const DriveIdentification& identified) {
   TextTable table;
   table.header({"parameter", "value", "standard error", "95 % interval", "what it is"});
   for (const IdentifiedDriveParameter& parameter : identified.parameters) {
@@ -39,10 +52,10 @@ std::string parameter_table(const DriveIdentification& identified) {
                    : "-",
                note});
   }
-  return table.text();
+  return table;
 }
 
-std::string score_table(const DriveIdentification& identified) {
+TextTable drive_score_table(const DriveIdentification& identified) {
   TextTable table;
   table.header({"recording", "group", "fitted [rad]", "held out [rad]", "nested [rad]"});
   for (const DriveRecordingScore& score : identified.recordings)
@@ -50,21 +63,8 @@ std::string score_table(const DriveIdentification& identified) {
                angle_text(score.held_out_mae_rad), angle_text(score.nested_mae_rad)});
   table.row({"mean", "", angle_text(identified.mae_rad), angle_text(identified.held_out_mae_rad),
              angle_text(identified.nested_mae_rad)});
-  return table.text();
+  return table;
 }
-
-std::string structure_text(const DriveIdentification& identified) {
-  if (identified.trials.empty())
-    return fmt::format("terms beyond the base: {} (stated)\n", terms_text(identified.terms));
-  std::string steps;
-  for (const StructureTrial& trial : identified.trials)
-    if (trial.is_taken)
-      steps += fmt::format("{}{} {:.4f}", steps.empty() ? "" : ", ", trial.change, trial.mae_rad);
-  return fmt::format("terms beyond the base: {} (chosen by held-out error in rad: {})\n",
-                     terms_text(identified.terms), steps);
-}
-
-}  // namespace
 
 std::string terms_text(const DriveTerms& terms) {
   std::string text;
@@ -80,7 +80,7 @@ std::string identification_text(const DriveIdentification& identified) {
     text += fmt::format("{} {}: {}\n", finding.is_failure ? "FAIL" : "WARN", finding.subject,
                         finding.text);
   if (!text.empty()) text += "\n";
-  text += parameter_table(identified) + "\n" + score_table(identified);
+  text += drive_parameter_table(identified).text() + "\n" + drive_score_table(identified).text();
   text +=
       "mean |measured - simulated angle| in free runs from the command alone. held out: fitted "
       "without the recording's "
@@ -104,14 +104,18 @@ std::string identification_text(const DriveIdentification& identified) {
   return text;
 }
 
-std::string drive_advice_text(const std::vector<DriveAdvice>& advice) {
+TextTable drive_advice_table(const std::vector<DriveAdvice>& advice) {
   TextTable table;
   table.header({"next recording", "lowers the standard error of", "to"});
   for (const DriveAdvice& row : advice)
     table.row({row.recording,
                std::string(drive_parameters()[static_cast<std::size_t>(row.parameter)].name),
                fmt::format("{:.0f} %", 100.0 * row.standard_error_ratio)});
-  return table.text();
+  return table;
+}
+
+std::string drive_advice_text(const std::vector<DriveAdvice>& advice) {
+  return drive_advice_table(advice).text();
 }
 
 std::string identification_json(const DriveIdentification& identified,

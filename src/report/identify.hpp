@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "torsio/identify/drive/identify_drive.hpp"
+#include "torsio/report/text_table.hpp"
 
 namespace torsio {
 
@@ -12,7 +13,13 @@ namespace torsio {
 [[nodiscard]] std::string identification_json(const DriveIdentification& identified,
                                               const std::vector<DriveAdvice>& advice);
 
+/// Each parameter with its standard error, its interval and what it is.
+[[nodiscard]] TextTable drive_parameter_table(const DriveIdentification& identified);
+/// The errors of the free runs, one row for each recording and one for the mean.
+[[nodiscard]] TextTable drive_score_table(const DriveIdentification& identified);
+
 /// The recordings to make next.
+[[nodiscard]] TextTable drive_advice_table(const std::vector<DriveAdvice>& advice);
 [[nodiscard]] std::string drive_advice_text(const std::vector<DriveAdvice>& advice);
 
 /// "delay, load_friction"; the base is not named.

@@ -10,10 +10,12 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "common/report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/identify/drive/identify_drive.hpp"
 #include "torsio/identify/drive/write_drive.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 #include "verbs.hpp"
 
@@ -36,6 +38,7 @@ struct DriveIdentifyFlags {
   std::vector<std::pair<std::string, std::string>> written;  ///< target and file
   std::string name = "servo";
   JsonOutput json;
+  ReportOutput report;
 };
 
 torsio::DriveTerms terms_of(const std::string& text) {
@@ -115,7 +118,8 @@ void run(DriveIdentifyFlags& flags) {
          .advice = "Example: torsio identify logs/*.json.gz --load pendulum.yaml -o servo.json"});
   std::vector<std::string> inputs{flags.load};
   if (!flags.drive.empty()) inputs.push_back(flags.drive);
-  std::vector<std::string> outputs{flags.output, flags.json.destination};
+  std::vector<std::string> outputs{flags.output, flags.json.destination, flags.report.destination,
+                                   flags.report.plot};
   for (const auto& [target, file] : flags.written) {
     (void)torsio::drive_target(target);
     outputs.push_back(file);
@@ -148,6 +152,8 @@ void run(DriveIdentifyFlags& flags) {
     remark(written_text(flags.written[k].first, flags.written[k].second, written[k]));
   }
   if (!flags.output.empty()) write_text(flags.output, document);
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::identification_report(identified, recordings, advice));
 }
 
 }  // namespace
@@ -195,5 +201,6 @@ void add_identify(CLI::App& app) {
   verb->add_option("--name", flags->name, "of the actuator in these files")->capture_default_str();
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
+  flags->report.add(*verb, "Mean |error");
   verb->callback([flags] { run(*flags); });
 }

@@ -17,6 +17,7 @@
 #include "torsio/evaluate/fit_report.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
 #include "torsio/evaluate/transfer_curve.hpp"
+#include "torsio/identify/drive/identify_drive.hpp"
 #include "torsio/report/attribution.hpp"
 #include "torsio/report/document/report_document.hpp"
 #include "torsio/sim/arm/arm_run.hpp"
@@ -78,6 +79,13 @@ namespace torsio {
 /// @param summary sentences
 [[nodiscard]] ReportDocument arm_report(const ArmSetup& setup, const ArmRun& run,
                                         std::vector<std::string> summary);
+
+/// Findings, errors of the free runs, parameters with their 95 % intervals, friction over speed and load, the structures
+/// that were compared, and the measured and simulated motion of each recording.
+/// @param recordings those of `identified.recordings`, in their order
+[[nodiscard]] ReportDocument identification_report(const DriveIdentification& identified,
+                                                   const std::vector<Recording>& recordings,
+                                                   const std::vector<DriveAdvice>& advice);
 
 /// A page with the text of a verb and its figures.
 [[nodiscard]] ReportDocument text_report(std::string title, std::vector<std::string> summary,
