@@ -16,6 +16,7 @@
 
 #include "evaluate/common_samples.hpp"
 #include "evaluate/fit_and_score.hpp"
+#include "evaluate/left_ranges.hpp"
 #include "evaluate/model_label.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -210,6 +211,8 @@ Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                        const std::vector<ScoredRun>& runs) {
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
+  results.warnings =
+      left_range_warnings(make_estimator(file, dataset.sample_rate_Hz()).settings(), dataset);
   for (const Role role : kRoles)
     if (dataset.has_role(role))
       std::ranges::move(rows_of(file, role, evaluate(runs, role)),
@@ -222,6 +225,7 @@ Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Prog
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
   const Estimator estimator = make_estimator(file, dataset.sample_rate_Hz());
+  results.warnings = left_range_warnings(estimator.settings(), dataset);
   const std::vector<SplitScore> scores = evaluate(estimator, dataset, kRoles, progress);
   for (std::size_t i = 0; i < kRoles.size(); ++i)
     if (dataset.has_role(kRoles[i]))

@@ -1,5 +1,6 @@
 #include "torsio/evaluate/evaluate.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +12,7 @@
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "support/fitted_families.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
@@ -151,6 +153,23 @@ TEST(Evaluate, KnowsThatTheZerosOfRecordingsWereSubtracted) {
   EXPECT_EQ(
       predict(make_estimator(model.file), dataset.records[2].recording).estimates.back().fault,
       Fault::none);
+}
+
+TEST(EvaluateModel, SaysWhichInputLeavesTheTrainingByHowMuch) {
+  const Dataset dataset = test::bench_dataset();
+  const ModelFile file = trained(dataset, "linear_coulomb").file;
+  EXPECT_THAT(evaluate_model(file, dataset).warnings, testing::IsEmpty());
+  Dataset larger;
+  larger.target = dataset.target;
+  test::add_record(larger, test::bench_recording("larger", {.amplitude_rad = 0.09}), Role::test);
+  const std::vector<std::string> warnings = evaluate_model(file, larger).warnings;
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_THAT(warnings[0], testing::StartsWith("spring_deflection_rad is -0.0"));
+  EXPECT_THAT(warnings[0], testing::HasSubstr("add a training recording that covers this range"));
+  EXPECT_THAT(warnings[1], testing::StartsWith("lowpass(spring_deflection_rate_rad_s, 10Hz) is"));
+  EXPECT_THAT(warnings[1], testing::HasSubstr("moves 3.0 times as fast"));
+  const std::vector<ScoredRun> runs = scored_runs(make_estimator(file), larger);
+  EXPECT_EQ(evaluate_model(file, larger, runs).warnings, warnings);
 }
 
 TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {

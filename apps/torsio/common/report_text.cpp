@@ -88,9 +88,11 @@ std::string evaluation_text(const torsio::Results& results) {
                percent(row.score.within_2_std_dev), fmt::format("{:.0f}", row.score.step_ns_p50),
                fmt::format("{:.0f}", row.score.step_ns_p999)});
   }
-  return fmt::format("target {}, inputs {}\nerrors in {}, free run\n{}", results.target,
-                     fmt::join(results.inputs, ", "),
-                     results.unit.empty() ? "no unit" : results.unit, table.text());
+  std::string text = fmt::format("target {}, inputs {}\nerrors in {}, free run\n{}", results.target,
+                                 fmt::join(results.inputs, ", "),
+                                 results.unit.empty() ? "no unit" : results.unit, table.text());
+  for (const std::string& warning : results.warnings) text += "WARNING: " + warning + "\n";
+  return text;
 }
 
 std::string first_failure(const torsio::Results& results) {

@@ -55,7 +55,9 @@ struct Results {
   std::vector<std::pair<std::string, std::vector<std::string>>> input_sets = {};
   bool non_causal_zero = false;
   std::vector<ResultRow> rows = {};
-  std::vector<std::string> warnings = {};  ///< from the fits, each with the models that it is about
+  /// Warnings of the fits, each with the models that it is about; for one model, inputs that leave their range of its
+  /// training.
+  std::vector<std::string> warnings = {};
   std::vector<Ranking> rankings = {};  ///< one for each held-out split; empty: nothing was compared
 };
 

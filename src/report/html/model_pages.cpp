@@ -40,13 +40,13 @@ std::vector<std::string> score_summary(const Results& results, const std::string
       if (row.status != "ok") return {family + " could not be scored: " + row.reason};
       const double guarded = static_cast<double>(row.score.guarded_samples) /
                              static_cast<double>(row.score.metrics.samples);
-      return {fmt::format("{} on {} {} samples: RMSE {} {}, largest error {} {}.", family,
-                          row.score.metrics.samples, name(role), error_text(row.score.metrics.rmse),
-                          results.unit, error_text(row.score.metrics.max_abs), results.unit),
-              fmt::format("A guard or fault replaced it in {} % of the samples, and {} % of the "
-                          "errors are within "
-                          "two error bars (95.4 % if these are right).",
-                          percent_text(guarded), percent_text(row.score.within_2_std_dev))};
+      return {
+          fmt::format("{} on {} {} samples: RMSE {} {}, largest error {} {}.", family,
+                      row.score.metrics.samples, name(role), error_text(row.score.metrics.rmse),
+                      results.unit, error_text(row.score.metrics.max_abs), results.unit),
+          fmt::format("A guard reported a fault in {} % of the samples, and {} % of the errors are "
+                      "within two error bars (95.4 % if these are right).",
+                      percent_text(guarded), percent_text(row.score.within_2_std_dev))};
     }
   return {};
 }
@@ -108,6 +108,8 @@ ReportDocument evaluation_report(const Results& results, const std::vector<Score
                           .summary = score_summary(results, file.card.fitted_as),
                           .sections = {},
                           .origin = origin_of(dataset)};
+  for (const std::string& warning : results.warnings)
+    document.summary.push_back("Warning: " + warning + ".");
   document.sections.push_back({.heading = "Scores",
                                .text = fmt::format("Errors in {}, free run.", results.unit),
                                .tables = {score_table(results)}});

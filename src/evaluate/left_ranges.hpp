@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/data/dataset.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
+
+namespace torsio {
+
+/// For each input of a model that leaves its range of the training in at least one of a hundred held-out samples: how
+/// far, how often, and which recording would contain it. A guard reports these samples (`Fault::outside_training_range`).
+/// @param settings at the sample rate of the dataset
+/// @throws Error as `Recording::channel` if a raw input is missing.
+[[nodiscard]] std::vector<std::string> left_range_warnings(const EstimatorSettings& settings,
+                                                           const Dataset& dataset);
+
+}  // namespace torsio
