@@ -136,7 +136,7 @@ void roll_out_bam(BamModel model, const DriveLog& log, const DriveRun& run,
 }
 
 DriveProblem bam_problem(const std::vector<const DriveLog*>& logs, BamModel model) {
-  DriveProblem problem{.logs = logs, .searched = {}, .roll_out = {}};
+  DriveProblem problem{.logs = logs, .searched = {}, .log_weights = {}, .roll_out = {}};
   for (const std::size_t row : bam_rows(model)) {
     const BamParameter& parameter = kBamParameters[row];
     problem.searched.push_back({.index = row,

@@ -9,7 +9,9 @@
 namespace torsio {
 namespace {
 
-// A term goes if the held-out error falls by this share without it: a smaller change is within what the groups scatter.
+// A term goes if the held-out error falls by this share without it, and by one standard error of the recordings'
+// differences. A term that hardly changes the fit goes even if the held-out error only does not rise.
+constexpr double kIdle = 1.03;  // share of the loss of training without the term
 constexpr double kLeastFall = 0.03;
 constexpr std::size_t kCandidates = 3;  // terms whose held-out errors are computed
 
@@ -69,6 +71,20 @@ std::vector<DriveTerm> cheapest(const GroupedLogs& logs, const HeldOutStructure&
   for (std::size_t k = 0; k < std::min(kCandidates, order.size()); ++k)
     best.push_back(terms[order[k]]);
   return best;
+}
+
+double loss_of_training(const HeldOutStructure& structure) {
+  double sum = 0.0;
+  for (const DriveSolution& fit : structure.fits) sum += fit.cost;
+  return sum;
+}
+
+bool is_better_without(const HeldOutStructure& without, const HeldOutStructure& with, double least,
+                       double scatter) {
+  const bool is_beyond_scatter = with.mae_rad - without.mae_rad >= scatter;
+  if (is_beyond_scatter && without.mae_rad <= (1.0 - kLeastFall) * least) return true;
+  const bool is_idle = loss_of_training(without) <= kIdle * loss_of_training(with);
+  return is_idle && without.mae_rad <= with.mae_rad;
 }
 
 }  // namespace
@@ -141,7 +157,8 @@ ChosenStructure choose_structure(const GroupedLogs& logs, const DriveTerms& larg
            .change = "without " + std::string(name(candidates[c])),
            .mae_rad = trials[c].mae_rad,
            .gain_error_rad = standard_error(trials[c].mae_of_log_rad, now.mae_of_log_rad)});
-    if (!(trials[best].mae_rad <= (1.0 - kLeastFall) * least)) break;
+    const double scatter = chosen.trials[first + best].gain_error_rad;
+    if (!is_better_without(trials[best], now, least, scatter)) break;
     chosen.trials[first + best].is_taken = true;
     chosen.held_out = std::move(trials[best]);
     least = std::min(least, chosen.held_out.mae_rad);

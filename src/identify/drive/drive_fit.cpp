@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <random>
 #include <span>
 
@@ -201,7 +202,15 @@ std::vector<DriveValues> spring_starts(const DriveProblem& problem, const DriveV
   return starts;
 }
 
-DriveSolution fit_two_masses(const DriveProblem& problem, const DriveLogs& logs,
+DriveLogs always_powered(const DriveLogs& logs) {
+  DriveLogs powered;
+  std::ranges::copy_if(logs, std::back_inserter(powered), [](const DriveLog* log) {
+    return std::ranges::find(log->enabled, 0.0) == log->enabled.end();
+  });
+  return powered;
+}
+
+DriveSolution search_springs(const DriveProblem& problem, const DriveLogs& logs,
                              const DriveTerms& terms, const DriveValues& typical,
                              const DriveFitOptions& options) {
   const DriveTerms one = terms & possible_terms(logs.front()->kind, false, false);
@@ -221,6 +230,44 @@ DriveSolution fit_two_masses(const DriveProblem& problem, const DriveLogs& logs,
   for (std::size_t k = 0; k < std::min(std::max<std::size_t>(options.starts, 1), near.size()); ++k)
     best = better(best, descend(problem, near[k].values, 0.0, kDifferences, 40, options.progress));
   return best;
+}
+
+/// A recording that the model fits worse counts less, as if each had a noise of its own: weights of the inverse mean
+/// square, down to a tenth of the mean.
+std::vector<double> weights_by_error(const DriveProblem& problem, const DriveValues& values) {
+  constexpr double kFloor = 0.1;
+  const DriveScore score = score_drive(problem, values);
+  std::vector<double> weights;
+  double sum = 0.0;
+  for (const double rmse : score.rmse_of_log_rad) {
+    weights.push_back(1.0 / (rmse * rmse + kFloor * score.rmse_rad * score.rmse_rad));
+    sum += weights.back();
+  }
+  if (!std::isfinite(sum)) return {};
+  for (double& weight : weights) weight *= static_cast<double>(weights.size()) / sum;
+  return weights;
+}
+
+DriveSolution reweighted(DriveProblem problem, const DriveValues& start,
+                         const DriveFitOptions& options) {
+  problem.log_weights = weights_by_error(problem, start);
+  return descend(problem, start, 0.0, std::span(kDifferences).last(2), 12, options.progress);
+}
+
+/// Where a fall ends depends on friction so steeply that a search from afar stays there: recordings with power first.
+DriveSolution fit_two_masses(const DriveLogs& logs, const DriveTerms& terms,
+                             const DriveFitOptions& options) {
+  const DriveProblem problem = drive_problem(logs, terms, options);
+  const DriveLogs powered = always_powered(logs);
+  constexpr std::size_t kFewestPowered = 2;
+  const bool has_falls = powered.size() < logs.size();
+  if (!has_falls || powered.size() < kFewestPowered)
+    return reweighted(
+        problem, search_springs(problem, logs, terms, typical_values(logs, terms), options).values,
+        options);
+  const DriveSolution start = search_springs(drive_problem(powered, terms, options), powered, terms,
+                                             typical_values(powered, terms), options);
+  return reweighted(problem, reweighted(problem, start.values, options).values, options);
 }
 
 }  // namespace
@@ -268,7 +315,7 @@ DriveTerms possible_terms(CommandKind kind, bool has_spring, bool fits_joint_ine
 
 DriveProblem drive_problem(const DriveLogs& logs, const DriveTerms& terms,
                            const DriveFitOptions& options) {
-  DriveProblem problem{.logs = logs, .searched = {}, .roll_out = {}};
+  DriveProblem problem{.logs = logs, .searched = {}, .log_weights = {}, .roll_out = {}};
   const double step_s = drive_step_s(terms, options);
   const DriveValues typical = typical_values(logs, terms);
   double inertia = HUGE_VAL;
@@ -299,10 +346,8 @@ DriveProblem drive_problem(const DriveLogs& logs, const DriveTerms& terms,
 
 DriveSolution fit_drive(const DriveLogs& logs, const DriveTerms& terms,
                         const DriveFitOptions& options) {
-  const DriveProblem problem = drive_problem(logs, terms, options);
-  const DriveValues typical = typical_values(logs, terms);
-  return has(terms, DriveTerm::spring) ? fit_two_masses(problem, logs, terms, typical, options)
-                                       : fit_problem(problem, typical, options);
+  if (has(terms, DriveTerm::spring)) return fit_two_masses(logs, terms, options);
+  return fit_problem(drive_problem(logs, terms, options), typical_values(logs, terms), options);
 }
 
 DriveSolution refit_drive(const DriveLogs& logs, const DriveTerms& terms, const DriveValues& start,
@@ -316,6 +361,7 @@ DriveSolution refit_drive(const DriveLogs& logs, const DriveTerms& terms, const 
       values[parameter.index] =
           std::clamp(start[parameter.index], parameter.lowest, parameter.highest);
   }
+  if (has(terms, DriveTerm::spring)) return reweighted(problem, values, options);
   return descend(problem, values, 0.0, std::span(kDifferences).last(2), 12, options.progress);
 }
 

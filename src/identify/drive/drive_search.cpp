@@ -38,12 +38,14 @@ struct WeightedRun {
 
 std::vector<WeightedRun> runs_of(const DriveProblem& problem, double window_s) {
   std::vector<WeightedRun> runs;
-  for (const DriveLog* log : problem.logs) {
+  for (std::size_t k = 0; k < problem.logs.size(); ++k) {
+    const DriveLog* log = problem.logs[k];
     std::size_t length = log->size();
     if (window_s > 0.0)
       length = std::clamp<std::size_t>(
           static_cast<std::size_t>(std::lround(window_s / log->sample_period_s)), 2, log->size());
-    const double weight = 1.0 / static_cast<double>(problem.logs.size() * log->size());
+    const double weight = (problem.log_weights.empty() ? 1.0 : problem.log_weights[k]) /
+                          static_cast<double>(problem.logs.size() * log->size());
     for (std::size_t first = 0; first + 2 <= log->size(); first += length)
       runs.push_back({log, run_from(*log, first, std::min(length, log->size() - first)), weight});
   }
@@ -316,6 +318,7 @@ DriveScore score_drive(const DriveProblem& problem, const DriveValues& values) {
       square += error * error;
     }
     score.mae_of_log_rad.push_back(sum / static_cast<double>(log->size()));
+    score.rmse_of_log_rad.push_back(std::sqrt(square / static_cast<double>(log->size())));
     squares += square / static_cast<double>(log->size());
     score.mae_rad += score.mae_of_log_rad.back() / static_cast<double>(problem.logs.size());
   }

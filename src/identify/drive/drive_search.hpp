@@ -29,6 +29,7 @@ struct SearchedDriveParameter {
 struct DriveProblem {
   std::vector<const DriveLog*> logs;
   std::vector<SearchedDriveParameter> searched;
+  std::vector<double> log_weights;  ///< in the loss, a mean of 1; empty: all 1
   RollOutLanes roll_out;
 };
 
@@ -51,6 +52,7 @@ struct DriveScore {
   double mae_rad = 0.0;
   double rmse_rad = 0.0;
   std::vector<double> mae_of_log_rad;
+  std::vector<double> rmse_of_log_rad;
 };
 
 /// Levenberg-Marquardt from `start`, by forward differences of 3, 1 and 0.3 %: what stops and starts make rough looks
