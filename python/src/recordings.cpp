@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <map>
+#include <string>
 #include <utility>
 
 #include "bindings.hpp"
@@ -227,11 +229,12 @@ py::tuple pickled(const py::object& self) {
     zeros.append(py::make_tuple(each.channel, each.first_s, each.mid_range));
   return py::make_tuple(kPickleVersion, recording.name(), recording.sample_rate_Hz(),
                         recording.time_s(0), channels, recording.conditions(), definitions, zeros,
-                        recording.mapping, recording.source.file, recording.source.sha256);
+                        recording.mapping, recording.source.file, recording.source.sha256,
+                        recording.labels);
 }
 
 Recording recording_unpickled(const py::tuple& state) {
-  check_pickle(state, 11, "Recording");
+  check_pickle(state, 12, "Recording");
   Recording recording(state[1].cast<std::string>(), state[2].cast<double>(),
                       state[3].cast<double>());
   const auto conditions = state[5].cast<std::vector<std::string>>();
@@ -265,6 +268,7 @@ Recording recording_unpickled(const py::tuple& state) {
   }
   recording.mapping = state[8].cast<std::string>();
   recording.source = {state[9].cast<std::string>(), state[10].cast<std::string>()};
+  recording.labels = state[11].cast<std::vector<std::pair<std::string, std::string>>>();
   return recording;
 }
 
@@ -296,6 +300,12 @@ void bind_recording(py::module_& module) {
                              })
       .def_property_readonly("conditions", &Recording::conditions,
                              "Channels that are constant over the record.")
+      .def_property_readonly(
+          "labels",
+          [](const Recording& self) {
+            return std::map<std::string, std::string>(self.labels.begin(), self.labels.end());
+          },
+          "Texts that the file states about the whole run, such as the motor in a log of BAM.")
       .def_property_readonly("file", [](const Recording& self) { return self.source.file; })
       .def_property_readonly(
           "notes", [](const Recording& self) { return self.notes; },

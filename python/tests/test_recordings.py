@@ -1,4 +1,5 @@
 import gzip
+import json
 import pickle
 
 import numpy as np
@@ -119,6 +120,15 @@ def test_a_recording_can_be_pickled(sweep):
         np.testing.assert_array_equal(again[channel], sweep[channel])
         np.testing.assert_array_equal(again.fresh(channel), sweep.fresh(channel))
     np.testing.assert_array_equal(again.time_s, sweep.time_s)
+
+
+def test_a_log_of_bam_has_labels(tmp_path):
+    entries = [{"timestamp": 0.01 * n, "position": 0.1 * n} for n in range(20)]
+    log = {"mass": 0.5, "length": 0.1, "kp": 8, "vin": 12, "motor": "m", "trajectory": "t", "entries": entries}
+    (tmp_path / "run.json").write_text(json.dumps(log))
+    (recording,) = torsio.read(tmp_path / "run.json")
+    assert recording.labels == {"motor": "m", "trajectory": "t"}
+    assert pickle.loads(pickle.dumps(recording)).labels == recording.labels
 
 
 def test_a_recording_is_written_and_read(tmp_path, sweep):

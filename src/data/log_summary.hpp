@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/progress.hpp"
@@ -25,9 +26,11 @@ struct TopicSummary {
 struct LogSummary {
   std::vector<TopicSummary> topics;
   bool is_unfinished = false;  ///< the recorder was stopped before it closed the file
+  std::vector<std::pair<std::string, double>> conditions = {};   ///< facts about the whole file, in SI
+  std::vector<std::pair<std::string, std::string>> labels = {};  ///< texts about the whole file
 };
 
-/// Topics and fields of an MCAP file or of the folder of rosbag2.
+/// Topics and fields of an MCAP file or of the folder of rosbag2; of a log of BAM its entries, as one topic.
 /// @throws Error for a file of another format.
 [[nodiscard]] LogSummary list_log(const std::string& path, const Progress& progress = {});
 

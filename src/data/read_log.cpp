@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -275,14 +276,45 @@ LogTable read_log(const std::string& path, const ReadLogOptions& options) {
   return table;
 }
 
+namespace {
+
+/// The entries of a log of BAM as one topic, with the header.
+LogSummary summary_of_bam(LogTable table) {
+  const std::vector<double>& times_s = table.columns.front().values;
+  const auto ns = [](double time_s) {
+    return static_cast<std::int64_t>(std::llround(1e9 * time_s));
+  };
+  TopicSummary entries;
+  entries.topic = "entries";
+  entries.schema = "BAM";
+  entries.encoding = "json";
+  entries.messages = table.rows();
+  if (!times_s.empty()) {
+    entries.first_ns = ns(times_s.front());
+    entries.last_ns = ns(*std::ranges::max_element(times_s));
+  }
+  for (std::size_t row = 1; row < times_s.size(); ++row)
+    entries.largest_gap_ns =
+        std::max(entries.largest_gap_ns, ns(times_s[row]) - ns(times_s[row - 1]));
+  entries.fields = table.column_names();
+  return {.topics = {std::move(entries)},
+          .is_unfinished = table.is_unfinished,
+          .conditions = std::move(table.conditions),
+          .labels = std::move(table.labels)};
+}
+
+}  // namespace
+
 LogSummary list_log(const std::string& path, const Progress& progress) {
   const OpenFiles files(path, progress);
   const Format format = files.format();
   refuse_if_foreign(files);
+  if (format == Format::bam)
+    return summary_of_bam(read_bam_log(*files.sources.front(), name_of(path), progress));
   if (!has_messages(format))
     throw Error({.place = name_of(path),
                  .expected = "a file of messages: MCAP, a bag of ROS 1, or the folder or database "
-                             "of rosbag2",
+                             "of rosbag2; or a log of BAM",
                  .found = "another file",
                  .advice = "The columns of a CSV file are in its first line."});
   return summary_of_messages(OpenMessages(files, format, progress).all());

@@ -36,8 +36,19 @@ std::string log_summary_text(const LogSummary& summary) {
   }
   std::string text = summary.topics.empty() ? "no messages\n" : table.text();
   if (!fields.empty()) text += "\nfields, for from: of a mapping\n" + fields;
+  for (const auto& [condition, value] : summary.conditions)
+    text += fmt::format("condition {}: {:g}\n", condition, value);
+  for (const auto& [label, value] : summary.labels)
+    text += fmt::format("label {}: {}\n", label, value);
   if (summary.is_unfinished)
     text += "\nThe recorder did not close this file: it is read up to its last whole record.\n";
+  return text;
+}
+
+std::string labels_text(const Recording& recording) {
+  std::string text = recording.name() + ":";
+  for (const auto& [label, value] : recording.labels)
+    text += fmt::format("{} {} {}", text.ends_with(':') ? "" : ",", label, value);
   return text;
 }
 
@@ -54,8 +65,12 @@ std::string log_summary_json(const LogSummary& summary) {
                       {"fields", topic.fields},
                       {"problem", topic.problem}});
   }
-  return json_text(
-      nlohmann::ordered_json{{"topics", std::move(topics)}, {"unfinished", summary.is_unfinished}});
+  nlohmann::ordered_json document{{"topics", std::move(topics)},
+                                  {"unfinished", summary.is_unfinished}};
+  for (const auto& [condition, value] : summary.conditions)
+    document["conditions"][condition] = value;
+  for (const auto& [label, value] : summary.labels) document["labels"][label] = value;
+  return json_text(document);
 }
 
 }  // namespace torsio

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "data/log_summary.hpp"
+#include "torsio/data/recording.hpp"
 
 namespace torsio {
 
@@ -12,5 +13,8 @@ namespace torsio {
 /// `{"topics": [{"topic", "schema", "encoding", "messages", "rate_Hz", "duration_s",
 /// "largest_gap_s", "fields", "problem"}], "unfinished"}`.
 [[nodiscard]] std::string log_summary_json(const LogSummary& summary);
+
+/// "run: motor xl330, trajectory sin_sin"
+[[nodiscard]] std::string labels_text(const Recording& recording);
 
 }  // namespace torsio

@@ -8,7 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "data/log_summary.hpp"
+#include "data/read_log.hpp"
 #include "data/resample.hpp"
+#include "report/log_summary.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
@@ -223,6 +226,21 @@ TEST(BamLog, IsNamedWhereOtherJsonIsRefused) {
   const WrittenLog log(R"({"t": [0, 1], "q": [0, 1]})");
   EXPECT_THAT(error_message([&] { return load_recordings(log.path); }),
               AllOf(HasSubstr("JSON of BAM (an object with \"entries\")"), HasSubstr("read_json")));
+}
+
+TEST(ListLog, HasTheColumnsConditionsAndLabelsOfALogOfBam) {
+  const WrittenLog log(log_of());
+  const LogSummary summary = list_log(log.path);
+  ASSERT_EQ(summary.topics.size(), 1U);
+  EXPECT_EQ(summary.topics[0].messages, 20U);
+  EXPECT_EQ(summary.topics[0].largest_gap_ns, 6'000'000);
+  EXPECT_THAT(summary.topics[0].fields, testing::Contains("duty_1"));
+  EXPECT_THAT(summary.conditions, testing::Contains(Pair("kp_1", 400.0)));
+  EXPECT_THAT(log_summary_text(summary),
+              AllOf(HasSubstr("condition mass_kg: 0.49"), HasSubstr("label trajectory: sin_sin")));
+  EXPECT_THAT(log_summary_json(summary), HasSubstr("\"motor\": \"xl330\""));
+  EXPECT_EQ(labels_text(load_recordings(log.path).front()),
+            "sin_sin_kp400: motor xl330, trajectory sin_sin");
 }
 
 }  // namespace

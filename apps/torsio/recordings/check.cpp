@@ -64,6 +64,8 @@ Checked checked(const CheckFlags& flags) {
     ProgressBar progress;
     torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+    for (const torsio::DatasetRecord& record : dataset.records)
+      if (!record.recording.labels.empty()) remark(torsio::labels_text(record.recording));
     flags.data.compute_target(dataset, spec);
     const auto wanted = wanted_of(flags, dataset, spec);  // a wrong call before any work
     Checked result{.findings = {{torsio::Verdict::pass, "clock", "", "uniform", ""}}, .advice = {}};
@@ -146,8 +148,10 @@ void add_check(CLI::App& app) {
                        "(docs/use/known_load.md)");
   verb->add_option("--test", flags->test,
                    "held-out recordings: are they inside the training range?");
-  verb->add_flag("--list", flags->list,
-                 "topics, rates, gaps and fields of an MCAP file or rosbag2 folder, for a mapping");
+  verb->add_flag(
+      "--list", flags->list,
+      "topics, rates, gaps and fields of an MCAP file or rosbag2 folder, for a mapping; of a "
+      "log of BAM its columns, conditions and labels");
   verb->add_flag("--advise", flags->advise,
                  "what to record next: the motion or condition whose absence costs most");
   verb->add_option(

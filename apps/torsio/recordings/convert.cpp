@@ -9,6 +9,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "report/json_text.hpp"
+#include "report/log_summary.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/recording_blocks.hpp"
 #include "torsio/data/write.hpp"
@@ -51,12 +52,15 @@ void run(ConvertFlags& flags) {
   torsio::write_recording(recording, flags.output, progress.listener());
   remark(fmt::format("{}: {} samples of {} channels at {:g} Hz", flags.output, recording.size(),
                      recording.channels().size(), recording.sample_rate_Hz()));
+  if (!recording.labels.empty())
+    remark(torsio::labels_text(recording) + "; " + flags.output + " does not keep them");
   nlohmann::ordered_json channels = nlohmann::ordered_json::array();
   for (const torsio::Channel& channel : recording.channels()) channels.push_back(channel.name);
-  flags.json.write(
-      torsio::json_text(nlohmann::ordered_json{{"samples", recording.size()},
-                                               {"channels", channels},
-                                               {"sample_rate_Hz", recording.sample_rate_Hz()}}));
+  nlohmann::ordered_json document{{"samples", recording.size()},
+                                  {"channels", channels},
+                                  {"sample_rate_Hz", recording.sample_rate_Hz()}};
+  for (const auto& [label, value] : recording.labels) document["labels"][label] = value;
+  flags.json.write(torsio::json_text(document));
 }
 
 }  // namespace
