@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <set>
 #include <string_view>
 #include <vector>
 
@@ -19,9 +20,16 @@ struct SidesOfInput {
   bool has_drive = false;
   bool has_only_speeds = true;
   bool has_lag = false;  ///< with which an expression can form a difference, thus a rate
+  bool has_minus = false;
+  std::set<std::string_view> drive_sensors = {};
 
+  /// Whether it is the twist between two sensors before the joint, as of the tube before a harmonic drive: each of them
+  /// follows the joint, and their difference only the torque.
+  [[nodiscard]] bool is_twist_of_drive() const {
+    return !has_joint && !has_lag && has_minus && drive_sensors.size() > 1;
+  }
   [[nodiscard]] bool is_computation() const {
-    return has_joint != has_drive && (!has_only_speeds || has_lag);
+    return !is_twist_of_drive() && has_joint != has_drive && (!has_only_speeds || has_lag);
   }
 };
 
@@ -50,6 +58,7 @@ class InputWalk {
         is_rate.pop_back();
       }
       if (!is_name(text[at])) {
+        found_.has_minus = found_.has_minus || text[at] == '-';
         ++at;
         continue;
       }
@@ -79,6 +88,7 @@ class InputWalk {
     const int order = order_of_channel(name);
     if (order < 0) return;
     (name.starts_with("joint_") ? found_.has_joint : found_.has_drive) = true;
+    if (!name.starts_with("joint_")) found_.drive_sensors.insert(name);
     found_.has_only_speeds = found_.has_only_speeds && order + rates == 1;
   }
 

@@ -213,6 +213,17 @@ TEST(LoadLeak, FindsTheComputationOfTheTorque) {
     EXPECT_EQ(load_leak(spec_of({"spring_deflection_rad", input})), input);
 }
 
+TEST(LoadLeak, IsNotTheTwistBetweenTwoSensorsOfTheDrive) {
+  EXPECT_EQ(load_leak(spec_of({"motor_angle_rad / 2 - wave_generator_angle_rad",
+                               "lowpass(rate(motor_angle_rad / 2 - wave_generator_angle_rad), "
+                               "10Hz)"})),
+            "");
+  for (const std::string input :
+       {"motor_angle_rad / 2 + wave_generator_angle_rad", "motor_angle_rad - motor_angle_rad / 2",
+        "motor_angle_rad - 0.5", "motor_angle_rad - lag(wave_generator_angle_rad, 2)"})
+    EXPECT_EQ(load_leak(spec_of({input})), input);
+}
+
 TEST(LoadLeak, IsRefusedWithAdvice) {
   const Dataset dataset = with_load(kExactLoad);
   const FeatureSpec features =
