@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "identify/drive/drive_document.hpp"
 #include "report/json_text.hpp"
-#include "report/result_parts.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -57,6 +57,13 @@ TextTable drive_parameter_table(const DriveIdentification& identified) {
 
 TextTable drive_score_table(const DriveIdentification& identified) {
   TextTable table;
+  if (identified.groups == 0) {
+    table.header({"recording", "error [rad]"});
+    for (const DriveRecordingScore& score : identified.recordings)
+      table.row({score.recording, angle_text(score.mae_rad)});
+    table.row({"mean", angle_text(identified.mae_rad)});
+    return table;
+  }
   table.header({"recording", "group", "fitted [rad]", "held out [rad]", "nested [rad]"});
   for (const DriveRecordingScore& score : identified.recordings)
     table.row({score.recording, score.group, angle_text(score.mae_rad),
@@ -66,12 +73,12 @@ TextTable drive_score_table(const DriveIdentification& identified) {
   return table;
 }
 
-std::string terms_text(const DriveTerms& terms) {
-  std::string text;
-  for (std::size_t k = 1; k < kDriveTerms; ++k)
-    if (terms.test(k))
-      text += fmt::format("{}{}", text.empty() ? "" : ", ", name(static_cast<DriveTerm>(k)));
-  return text.empty() ? "none" : text;
+std::string drive_evaluation_text(const DriveIdentification& evaluated) {
+  return drive_score_table(evaluated).text() +
+         fmt::format(
+             "mean |measured - simulated angle| in free runs from the command alone, RMSE {:.4f} "
+             "rad; nothing was fitted here.\n",
+             evaluated.rmse_rad);
 }
 
 std::string identification_text(const DriveIdentification& identified) {
@@ -120,51 +127,7 @@ std::string drive_advice_text(const std::vector<DriveAdvice>& advice) {
 
 std::string identification_json(const DriveIdentification& identified,
                                 const std::vector<DriveAdvice>& advice) {
-  DriveJson parameters = DriveJson::array();
-  for (const IdentifiedDriveParameter& parameter : identified.parameters)
-    parameters.push_back({{"name", info_of(parameter).name},
-                          {"value", json_number(parameter.value)},
-                          {"standard_error", json_number(parameter.standard_error)},
-                          {"lowest_95", json_number(parameter.lowest)},
-                          {"highest_95", json_number(parameter.highest)},
-                          {"standard_error_from_load", json_number(parameter.from_load)},
-                          {"is_determined", parameter.is_determined},
-                          {"is_at_bound", parameter.is_at_bound}});
-  DriveJson recordings = DriveJson::array();
-  for (const DriveRecordingScore& score : identified.recordings)
-    recordings.push_back({{"recording", score.recording},
-                          {"group", score.group},
-                          {"mae_rad", json_number(score.mae_rad)},
-                          {"held_out_mae_rad", json_number(score.held_out_mae_rad)},
-                          {"nested_mae_rad", json_number(score.nested_mae_rad)}});
-  DriveJson trials = DriveJson::array();
-  for (const StructureTrial& trial : identified.trials)
-    trials.push_back({{"terms", terms_text(trial.terms)},
-                      {"change", trial.change},
-                      {"held_out_mae_rad", json_number(trial.mae_rad)},
-                      {"difference_standard_error_rad", json_number(trial.gain_error_rad)},
-                      {"is_taken", trial.is_taken}});
-  DriveJson findings = DriveJson::array();
-  for (const DriveFinding& finding : identified.findings)
-    findings.push_back({{"status", finding.is_failure ? "FAIL" : "WARN"},
-                        {"subject", finding.subject},
-                        {"text", finding.text}});
-  DriveJson document{{"law", name(identified.drive.law)},
-                     {"terms", terms_text(identified.terms)},
-                     {"step_s", identified.step_s},
-                     {"mae_rad", json_number(identified.mae_rad)},
-                     {"rmse_rad", json_number(identified.rmse_rad)},
-                     {"held_out_mae_rad", json_number(identified.held_out_mae_rad)},
-                     {"nested_mae_rad", json_number(identified.nested_mae_rad)},
-                     {"groups", identified.groups},
-                     {"parameters", std::move(parameters)},
-                     {"recordings", std::move(recordings)},
-                     {"structures", std::move(trials)},
-                     {"findings", std::move(findings)}};
-  if (identified.error_gain)
-    document["error_gain"] = {{"value_1_rad", identified.error_gain->value_1_rad},
-                              {"residual_duty_1", identified.error_gain->residual_duty_1},
-                              {"samples", identified.error_gain->samples}};
+  DriveJson document = drive_document(identified);
   for (const DriveAdvice& row : advice)
     document["advice"].push_back(
         {{"recording", row.recording},

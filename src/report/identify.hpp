@@ -8,8 +8,11 @@
 
 namespace torsio {
 
+/// The errors of a drive that was only evaluated.
+[[nodiscard]] std::string drive_evaluation_text(const DriveIdentification& evaluated);
 /// Findings, parameters with standard errors, and the errors of the free runs.
 [[nodiscard]] std::string identification_text(const DriveIdentification& identified);
+/// `identified_drive_text` with the advice, as a document of the program.
 [[nodiscard]] std::string identification_json(const DriveIdentification& identified,
                                               const std::vector<DriveAdvice>& advice);
 
@@ -21,8 +24,5 @@ namespace torsio {
 /// The recordings to make next.
 [[nodiscard]] TextTable drive_advice_table(const std::vector<DriveAdvice>& advice);
 [[nodiscard]] std::string drive_advice_text(const std::vector<DriveAdvice>& advice);
-
-/// "delay, load_friction"; the base is not named.
-[[nodiscard]] std::string terms_text(const DriveTerms& terms);
 
 }  // namespace torsio

@@ -45,6 +45,40 @@ TEST_F(Report, OfEachVerbHasItsCommandAndFigures) {
   }
 }
 
+TEST_F(Report, OfAnIdentificationShowsEachMotionAndWhatWasFound) {
+  std::string recordings;
+  for (const char* seed : {"1", "2"}) {
+    const std::string file = std::string("air") + seed + ".csv";
+    ASSERT_EQ(torsio(std::string("simulate dfki-50 air-chirp --duration 8s --lever 0.2m --mass 9kg "
+                                 "--seed ") +
+                     seed + " -o " + file)
+                  .exit_code,
+              0);
+    recordings += " " + file;
+  }
+  (void)folder_.file("load.yaml", "load: {pendulum: {mass: mass_kg, length: lever_m}}\n");
+  const Outcome outcome = torsio("identify" + recordings +
+                                 " --load load.yaml --terms load_friction --starts 1 --report "
+                                 "out.html");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::vector<std::string> titles;
+  for (const auto& figure : figures("out.html")) {
+    titles.push_back(figure.at("title"));
+    if (figure.at("kind") != "time") continue;
+    std::vector<std::string> labels;
+    for (const auto& series : figure.at("panels").at(0).at("series"))
+      labels.push_back(series.at("label"));
+    EXPECT_EQ(labels, (std::vector<std::string>{"measured", "simulated", "held out"}));
+  }
+  EXPECT_EQ(titles, (std::vector<std::string>{"Mean |error of the angle| of each free run",
+                                              "Largest friction over speed and load",
+                                              "Angle of air1", "Angle of air2"}));
+  const std::string page = contents("out.html");
+  for (const char* text : {"WARN", "armature_kg_m2", "Recordings that lower a standard error most",
+                           "There are no standard errors here", "torsio identify"})
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+}
+
 TEST_F(Report, ThatCannotBeWrittenIsRefusedBeforeTheWork) {
   for (const char* place : {"nowhere/out.html", "out.txt", "a.csv"}) {
     const Outcome outcome =

@@ -15,7 +15,7 @@ namespace torsio {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+    const auto* const test = ::testing::UnitTest::GetInstance()->current_test_info();
     std::string name = test->name();
     std::ranges::replace(name, '/', '_');
     path_ = std::filesystem::temp_directory_path() /

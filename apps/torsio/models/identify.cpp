@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "common/report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/identify/drive/drive_file.hpp"
 #include "torsio/identify/drive/identify_drive.hpp"
 #include "torsio/identify/drive/write_drive.hpp"
 #include "torsio/report/html/verb_reports.hpp"
@@ -23,6 +25,7 @@ namespace {
 
 struct DriveIdentifyFlags {
   DataFlags data;
+  std::string from;  ///< file of an identified drive; empty: one is identified
   std::string load;
   std::string drive;
   std::string terms = "auto";
@@ -90,10 +93,12 @@ std::vector<torsio::Recording> recordings_of(const DriveIdentifyFlags& flags,
   std::vector<torsio::Recording> recordings;
   for (const std::string& file : flags.data.recordings)
     for (torsio::Recording& recording :
-         torsio::load_recordings(file, flags.data.load_options(progress))) {
-      DataFlags::remark_on_reading(std::vector<const torsio::Recording*>{&recording});
+         torsio::load_recordings(file, flags.data.load_options(progress)))
       recordings.push_back(std::move(recording));
-    }
+  std::vector<const torsio::Recording*> all;
+  all.reserve(recordings.size());
+  for (const torsio::Recording& recording : recordings) all.push_back(&recording);
+  DataFlags::remark_on_reading(all);
   return recordings;
 }
 
@@ -108,16 +113,18 @@ std::string written_text(const std::string& target, const std::string& file,
       written.own_mae_rad, missing.empty() ? "nothing" : missing);
 }
 
-void run(DriveIdentifyFlags& flags) {
-  if (flags.data.recordings.empty() || flags.load.empty())
+void check_call(DriveIdentifyFlags& flags) {
+  const bool has_load = !flags.load.empty() || !flags.from.empty();
+  if (flags.data.recordings.empty() || !has_load)
     throw torsio::UsageError(
         {.place = "torsio identify",
-         .expected =
-             "recordings and --load load.yaml, the known load that gives the torque its scale",
+         .expected = "recordings, and --load load.yaml, the known load that gives the torque its "
+                     "scale, or --from servo.json, a drive that was identified",
          .found = flags.data.recordings.empty() ? "no recordings" : "no --load",
          .advice = "Example: torsio identify logs/*.json.gz --load pendulum.yaml -o servo.json"});
-  std::vector<std::string> inputs{flags.load};
-  if (!flags.drive.empty()) inputs.push_back(flags.drive);
+  std::vector<std::string> inputs;
+  for (const std::string& file : {flags.from, flags.load, flags.drive})
+    if (!file.empty()) inputs.push_back(file);
   std::vector<std::string> outputs{flags.output, flags.json.destination, flags.report.destination,
                                    flags.report.plot};
   for (const auto& [target, file] : flags.written) {
@@ -125,35 +132,81 @@ void run(DriveIdentifyFlags& flags) {
     outputs.push_back(file);
   }
   flags.data.check_outputs(outputs, inputs);
-  const torsio::LoadSheet load = torsio::read_load_sheet(flags.load);
-  ProgressBar progress;
-  const std::vector<torsio::Recording> recordings = recordings_of(flags, progress.listener());
-  const torsio::DriveSheet drive = flags.drive.empty()
-                                       ? torsio::assumed_drive_sheet(recordings.front())
-                                       : torsio::read_drive_sheet(flags.drive);
-  if (flags.drive.empty())
-    remark("note: no --drive; the channels suggest the law '" +
-           std::string(torsio::name(drive.law)) + "'");
-  const torsio::IdentifyOptions options = options_of(flags, progress.listener());
-  const torsio::DriveIdentification identified =
-      torsio::identify_drive(recordings, load, drive, options);
+}
+
+torsio::DriveSheet drive_of(const DriveIdentifyFlags& flags, const torsio::Recording& recording) {
+  if (!flags.drive.empty()) return torsio::read_drive_sheet(flags.drive);
+  torsio::DriveSheet drive = torsio::assumed_drive_sheet(recording);
+  remark("note: no --drive; the channels suggest the law '" + std::string(torsio::name(drive.law)) +
+         "'");
+  return drive;
+}
+
+/// The drive of `--from` with the errors of these recordings; another load or law replaces that of the file.
+torsio::DriveIdentification evaluated_drive(const DriveIdentifyFlags& flags,
+                                            const std::vector<torsio::Recording>& recordings) {
+  torsio::DriveIdentification identified = torsio::read_identified_drive(flags.from);
+  if (!flags.load.empty()) identified.load = torsio::read_load_sheet(flags.load);
+  if (!flags.drive.empty()) {
+    const torsio::DriveLaw law = identified.drive.law;
+    const std::optional<double> error_gain_1_rad = identified.drive.error_gain_1_rad;
+    identified.drive = torsio::read_drive_sheet(flags.drive);
+    if (identified.drive.law != law)
+      throw torsio::UsageError(
+          {.place = "--drive",
+           .expected = fmt::format("the law '{}' of {}, for which its values were found",
+                                   torsio::name(law), flags.from),
+           .found = std::string(torsio::name(identified.drive.law))});
+    if (!identified.drive.error_gain_1_rad) identified.drive.error_gain_1_rad = error_gain_1_rad;
+  }
+  return torsio::evaluate_drive(identified, recordings, flags.group_by);
+}
+
+void write_files(const DriveIdentifyFlags& flags, const torsio::DriveIdentification& identified,
+                 const std::vector<torsio::Recording>& recordings,
+                 const torsio::IdentifyOptions& options) {
   std::vector<torsio::WrittenDrive> written;
   written.reserve(flags.written.size());
   for (const auto& [target, file] : flags.written)
     written.push_back(torsio::write_drive(torsio::drive_target(target), identified, recordings,
                                           flags.name, options));
-  const std::vector<torsio::DriveAdvice> advice = torsio::advise_drive(identified, recordings);
-  if (flags.json.wants_tables())
-    print(torsio::identification_text(identified) + "\n" + torsio::drive_advice_text(advice));
-  const std::string document = torsio::identification_json(identified, advice);
-  flags.json.write(document);
   for (std::size_t k = 0; k < written.size(); ++k) {
     write_text(flags.written[k].second, written[k].text);
     remark(written_text(flags.written[k].first, flags.written[k].second, written[k]));
   }
+}
+
+void run(DriveIdentifyFlags& flags) {
+  check_call(flags);
+  const bool is_evaluation = !flags.from.empty();
+  std::optional<torsio::LoadSheet> load;  // a mistake in it is found before the recordings are read
+  if (!is_evaluation) load = torsio::read_load_sheet(flags.load);
+  ProgressBar progress;
+  const std::vector<torsio::Recording> recordings = recordings_of(flags, progress.listener());
+  const torsio::IdentifyOptions options = options_of(flags, progress.listener());
+  const torsio::DriveIdentification identified =
+      is_evaluation
+          ? evaluated_drive(flags, recordings)
+          : torsio::identify_drive(recordings, *load, drive_of(flags, recordings.front()), options);
+  std::vector<torsio::DriveAdvice> advice;
+  if (!is_evaluation) advice = torsio::advise_drive(identified, recordings);
+  if (flags.json.wants_tables())
+    print(is_evaluation
+              ? torsio::drive_evaluation_text(identified)
+              : torsio::identification_text(identified) + "\n" + torsio::drive_advice_text(advice));
+  const std::string document = torsio::identification_json(identified, advice);
+  flags.json.write(document);
+  write_files(flags, identified, recordings, options);
   if (!flags.output.empty()) write_text(flags.output, document);
   if (flags.report.is_wanted())
     flags.report.write(torsio::identification_report(identified, recordings, advice));
+}
+
+/// What would have no effect on a drive that is only evaluated is refused.
+void exclude_from(CLI::App& verb, CLI::Option& from) {
+  for (const char* option :
+       {"--terms", "--spring", "--step", "--no-standard-errors", "--no-nested", "--output"})
+    from.excludes(verb.get_option(option));
 }
 
 }  // namespace
@@ -165,9 +218,14 @@ void add_identify(CLI::App& app) {
                                       "angle and a known load, without a torque sensor");
   verb->footer(
       "Example: torsio identify logs/*.json.gz --load pendulum.yaml -o servo.json\n"
+      "         torsio identify new.json.gz --from servo.json --write mjcf servo.xml\n"
       "docs/use/identify.md has the equations, the files and what to record.");
   flags->data.add_recordings(*verb, "recordings of the joint moving the load, or manifests");
   flags->data.add_mapping(*verb);
+  CLI::Option* const from = verb->add_option(
+      "--from", flags->from,
+      "file of an identified drive (-o): its free runs through these recordings, without a fit; "
+      "--load and --drive replace what it states");
   verb->add_option("--load", flags->load, "file of the known load (docs/use/known_load.md)");
   verb->add_option("--drive", flags->drive, "file of the drive's law; default: by the channels");
   verb->add_option("--terms", flags->terms,
@@ -193,7 +251,8 @@ void add_identify(CLI::App& app) {
                  "skip the choice of the terms without each group");
   add_seed(*verb, flags->seed, "seed of the starts");
   verb->add_option("-o,--output", flags->output,
-                   "file of the identified drive (JSON); untouched unless the work succeeds");
+                   "file of the identified drive (JSON), for --from; untouched unless the work "
+                   "succeeds");
   verb->add_option("--write", flags->written,
                    "TARGET FILE: the drive for another program, bam, mjcf or isaaclab, refitted "
                    "with its step; repeatable")
@@ -202,5 +261,6 @@ void add_identify(CLI::App& app) {
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
   flags->report.add(*verb, "Mean |error");
+  exclude_from(*verb, *from);
   verb->callback([flags] { run(*flags); });
 }

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "identify/drive/drive_document.hpp"
 #include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "report/identify.hpp"
@@ -14,6 +15,9 @@
 
 namespace torsio {
 namespace {
+
+/// Whether the recordings are others than those of the fit.
+bool is_evaluated(const DriveIdentification& identified) { return identified.groups == 0; }
 
 /// The free runs of a recording.
 struct DriveRuns {
@@ -93,7 +97,8 @@ XyFigure errors_figure(const DriveIdentification& identified) {
     }
     if (has_any) figure.series.push_back(std::move(series));
   };
-  add("fitted", CurveStyle::columns, CurveRole::model, &DriveRecordingScore::mae_rad);
+  add(is_evaluated(identified) ? "error" : "fitted", CurveStyle::columns, CurveRole::model,
+      &DriveRecordingScore::mae_rad);
   add("held out", CurveStyle::points, CurveRole::measured, &DriveRecordingScore::held_out_mae_rad);
   add("nested", CurveStyle::points, CurveRole::limit, &DriveRecordingScore::nested_mae_rad);
   return figure;
@@ -103,7 +108,7 @@ const DriveParameterInfo& row_of(const IdentifiedDriveParameter& parameter) {
   return drive_parameters()[static_cast<std::size_t>(parameter.parameter)];
 }
 
-/// 95 % intervals as horizontal bars, one above the other: over the value where the parameter is positive, else over the
+/// 95 % intervals as horizontal lines, one above the other: over the value where the parameter is positive, else over the
 /// standard error.
 XyFigure intervals_figure(const DriveIdentification& identified, bool of_positive) {
   XyFigure figure{
@@ -124,9 +129,10 @@ XyFigure intervals_figure(const DriveIdentification& identified, bool of_positiv
     values.x.push_back(parameter.value / unit);
     values.y.push_back(row);
     values.names.emplace_back(row_of(parameter).name);
-    XySeries& bars = parameter.is_determined ? determined : others;
-    bars.x.insert(bars.x.end(), {parameter.lowest / unit, parameter.highest / unit, kNotMeasured});
-    bars.y.insert(bars.y.end(), {row, row, kNotMeasured});
+    XySeries& intervals = parameter.is_determined ? determined : others;
+    intervals.x.insert(intervals.x.end(),
+                       {parameter.lowest / unit, parameter.highest / unit, kNotMeasured});
+    intervals.y.insert(intervals.y.end(), {row, row, kNotMeasured});
   }
   for (XySeries* series : {&determined, &others, &values})
     if (!series->x.empty()) figure.series.push_back(std::move(*series));
@@ -209,16 +215,18 @@ ReportSection structures_section(const DriveIdentification& identified) {
           trial.is_taken ? "yes" : "no"}});
   return {.heading = "Structures that were compared",
           .text =
-              "A term is taken out if the held-out error falls by 3 % without it. This error "
-              "is too good for the structure that it chose; the nested one is not.",
+              "The error of recordings that were left out of the fit; docs/use/identify.md has "
+              "the rule of the choice. That error is too good for the structure that it chose; "
+              "the nested one is not.",
           .tables = {std::move(table)}};
 }
 
 std::vector<std::string> summary_of(const DriveIdentification& identified) {
   std::vector<std::string> summary{
       fmt::format("In free runs from the command alone the angle is wrong by {:.4f} rad (mean of "
-                  "|error|) in {} recordings that were fitted.",
-                  identified.mae_rad, identified.recordings.size())};
+                  "|error|) in {} recordings that were {}.",
+                  identified.mae_rad, identified.recordings.size(),
+                  is_evaluated(identified) ? "not fitted here" : "fitted")};
   if (std::isfinite(identified.held_out_mae_rad))
     summary.push_back(fmt::format(
         "In recordings that were left out of the fit it is wrong by {:.4f} rad ({} groups){}.",
@@ -254,7 +262,8 @@ ReportDocument identification_report(const DriveIdentification& identified,
        .tables = {numbered(report_table(drive_score_table(identified)),
                            identified.recordings.size())},
        .figures = {errors_figure(identified)},
-       .preformatted = identification_text(identified)});
+       .preformatted = is_evaluated(identified) ? drive_evaluation_text(identified)
+                                                : identification_text(identified)});
   document.sections.push_back(parameters_section(identified));
   document.sections.push_back(
       {.heading = "Friction",

@@ -98,7 +98,7 @@ struct DriveIdentification {
   std::optional<MeasuredErrorGain> error_gain;
   std::vector<DriveFinding> findings;
   double step_s = 0.0;
-  std::size_t groups = 0;
+  std::size_t groups = 0;  ///< 0: of a drive that was only evaluated
 };
 
 /// The parameters of a drive by Levenberg-Marquardt on free runs from the commands alone, against the angle of one
@@ -108,6 +108,14 @@ struct DriveIdentification {
 [[nodiscard]] DriveIdentification identify_drive(const std::vector<Recording>& recordings,
                                                  const LoadSheet& load, const DriveSheet& drive,
                                                  const IdentifyOptions& options = {});
+
+/// The same drive with the errors of its free runs through other recordings, in place of those of its fit: `recordings`,
+/// `mae_rad` and `rmse_rad` are theirs. Nothing is fitted; held-out errors, structures and findings are empty.
+/// @param group_by as in `IdentifyOptions`, for a later `write_drive`
+/// @throws Error naming recording and channel if one is missing or not finite.
+[[nodiscard]] DriveIdentification evaluate_drive(const DriveIdentification& identified,
+                                                 const std::vector<Recording>& recordings,
+                                                 const std::string& group_by = {});
 
 /// A recording to make next, and the parameter whose standard error it lowers most.
 struct DriveAdvice {
