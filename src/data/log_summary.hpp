@@ -26,7 +26,8 @@ struct TopicSummary {
 struct LogSummary {
   std::vector<TopicSummary> topics;
   bool is_unfinished = false;  ///< the recorder was stopped before it closed the file
-  std::vector<std::pair<std::string, double>> conditions = {};   ///< facts about the whole file, in SI
+  std::vector<std::pair<std::string, double>> conditions =
+      {};  ///< facts about the whole file, in SI
   std::vector<std::pair<std::string, std::string>> labels = {};  ///< texts about the whole file
 };
 

@@ -101,5 +101,29 @@ TEST_F(KnownLoadProgram, IsChecked) {
   EXPECT_NE(checked.out.find("known load"), std::string::npos) << checked.out;
 }
 
+TEST_F(KnownLoadProgram, LearnsFromTheConditionsThatAnExperimentInTheAirLogs) {
+  for (const std::string lever : {"0.1", "0.2"})
+    ASSERT_EQ(
+        torsio("simulate harmonic-drive:soft air-chirp --duration 30s --highest 4Hz --mass 12kg "
+               "--lever " +
+               lever + "m -o a" + lever + ".csv --json a.json")
+            .exit_code,
+        0);
+  const auto json = nlohmann::json::parse(contents("a.json"));
+  EXPECT_EQ(json.at("mass_kg"), 12.0);
+  EXPECT_EQ(json.at("highest_frequency_Hz"), 4.0);
+  EXPECT_TRUE(json.at("lowest_frequency_Hz").is_null());
+  (void)folder_.file(
+      "load.yaml",
+      "load:\n  pendulum: {mass: mass_kg, length: lever_m}\n  joint_inertia: 1kg_m2\n");
+  const Outcome fitted = torsio(
+      "fit a0.1.csv a0.2.csv --load load.yaml --target load_torque_Nm --model linear "
+      "--inputs 'motor_angle_rad / 2 - wave_generator_angle_rad' -o m.safetensors");
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  const Outcome refused = torsio("simulate dfki-50 air-chirp --lever 0.5m --mass 20kg -o b.csv");
+  EXPECT_EQ(refused.exit_code, kCallWasWrong);
+  EXPECT_NE(refused.err.find("the lever is too heavy"), std::string::npos) << refused.err;
+}
+
 }  // namespace
 }  // namespace torsio::test
