@@ -68,6 +68,7 @@ void bind_estimators(py::module_& module);
 void bind_batches(py::module_& module);
 void bind_learning(py::module_& module);
 void bind_control(py::module_& module);
+void bind_drives(py::module_& module);
 void bind_arms(py::module_& module);
 void bind_links(py::module_& module);
 void bind_graphs(py::module_& module);

@@ -70,6 +70,7 @@ PYBIND11_MODULE(_core, module) {
   bind_batches(module);
   bind_learning(module);
   bind_control(module);
+  bind_drives(module);
   bind_arms(module);
   bind_links(module);
   bind_graphs(module);

@@ -40,6 +40,7 @@ from ._tables import recording_from_dict, recording_from_pandas, recording_to_pa
 
 if TYPE_CHECKING:
     from . import link, plot
+    from ._drives import DriveParameter, IdentifiedDrive, identify, read_drive
     from ._learning import attribute, check, compare, crossvalidate, drift, evaluate, fit, margins, track, transfer
     from ._results import (
         CheckReport,
@@ -74,6 +75,7 @@ __all__ = [
     "CrossValidation",
     "Dataset",
     "Document",
+    "DriveParameter",
     "Error",
     "Estimate",
     "Estimates",
@@ -81,6 +83,7 @@ __all__ = [
     "Fault",
     "Finding",
     "FoldSummary",
+    "IdentifiedDrive",
     "Load",
     "Margins",
     "Model",
@@ -97,11 +100,13 @@ __all__ = [
     "evaluate",
     "families",
     "fit",
+    "identify",
     "link",
     "load",
     "margins",
     "plot",
     "read",
+    "read_drive",
     "read_load",
     "simulate",
     "sweep_dataset",
@@ -112,6 +117,7 @@ __all__ = [
 
 # Imported when they are first used: a loop that only loads a model starts sooner.
 _LATER = {
+    "_drives": "DriveParameter IdentifiedDrive identify read_drive",
     "_learning": "attribute check compare crossvalidate drift evaluate fit margins track transfer",
     "_results": "CheckReport Comparison CrossValidation Document Estimates Finding FoldSummary Margins Results Score",
 }

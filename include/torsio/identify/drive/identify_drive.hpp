@@ -92,7 +92,7 @@ struct DriveIdentification {
       kNotMeasured;  ///< error of this structure; too good if it was chosen by it
   double nested_mae_rad = kNotMeasured;
   std::vector<DriveRecordingScore> recordings;
-  /// Of each recording, the values of the fit without its group; empty with one group.
+  /// The values of the fit without its group, for each recording; empty with one group.
   std::vector<DriveValues> held_out_values;
   std::vector<StructureTrial> trials;
   std::optional<MeasuredErrorGain> error_gain;

@@ -1,0 +1,195 @@
+"""Motor, friction and spring of a joint without a torque sensor: `torsio identify` as a function."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Union
+
+from . import _core
+from ._core import Load, Recording, UsageError
+from ._results import _data_frame, _document, _number, _table_html
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+#: Recordings, paths of logs or manifests, or lists of them.
+Recordings = Union[Recording, str, "PathLike[str]", Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class DriveParameter:
+    """A number of an identified drive, in the SI unit that its name ends in; all are after the gear."""
+
+    name: str
+    value: float
+    standard_error: float  #: NaN with fewer than three recordings
+    lowest_95: float  #: ends of the 95 % interval; NaN with fewer than three recordings
+    highest_95: float
+    standard_error_from_load: float  #: the part of it that the load's errors cause
+    is_determined: bool  #: the interval spans less than a factor of 10
+    is_at_bound: bool
+
+
+class IdentifiedDrive:
+    """What `identify` found, or what `read_drive` read. Never changed."""
+
+    def __init__(self, core: _core.IdentifiedDrive, recordings: Recordings | None = None) -> None:
+        self._core = core
+        self._recordings = recordings
+        self._document = _document(core.document_json())
+
+    @property
+    def terms(self) -> list[str]:
+        """The terms of the model beyond the base (docs/use/identify.md)."""
+        text = str(self._document["terms"])
+        return [] if text == "none" else text.split(", ")
+
+    @property
+    def parameters(self) -> dict[str, DriveParameter]:
+        """By name: value, standard error and 95 % interval."""
+        rows = {}
+        for row in self._document["parameters"]:
+            numbers = {key: _number(value) for key, value in row.items() if key not in _NOT_NUMBERS}
+            rows[row["name"]] = DriveParameter(
+                name=row["name"],
+                is_determined=row["is_determined"],
+                is_at_bound=row["is_at_bound"],
+                **numbers,
+            )
+        return rows
+
+    @property
+    def mae_rad(self) -> float:
+        """Mean |measured - simulated angle| over the recordings, in free runs from the command alone."""
+        return _number(self._document["mae_rad"])
+
+    @property
+    def held_out_mae_rad(self) -> float:
+        """The same of recordings whose group the fit did not have; NaN with one group."""
+        return _number(self._document["held_out_mae_rad"])
+
+    @property
+    def nested_mae_rad(self) -> float:
+        """The same where the terms were chosen without the group, too; NaN with stated terms."""
+        return _number(self._document["nested_mae_rad"])
+
+    @property
+    def recordings(self) -> list[dict[str, Any]]:
+        """Of each recording: recording, group, mae_rad, held_out_mae_rad, nested_mae_rad."""
+        return [
+            {key: _number(value) if key.endswith("_rad") else value for key, value in row.items()}
+            for row in self._document["recordings"]
+        ]
+
+    @property
+    def findings(self) -> list[dict[str, str]]:
+        """What the recordings lack or what is conspicuous: status, subject, text."""
+        return list(self._document["findings"])
+
+    @property
+    def advice(self) -> list[dict[str, Any]]:
+        """Recordings to make next: recording, parameter, and the ratio of its standard error after to before."""
+        return list(self._document.get("advice", []))
+
+    def simulate(self, recording: Recording) -> dict[str, npt.NDArray[np.float64]]:
+        """A free run through a recording, from its command alone.
+
+        Arrays of shape (samples,): measured_rad and angle_rad of the encoder that was fitted, joint_angle_rad,
+        joint_torque_Nm.
+        """
+        return self._core.simulate(recording)
+
+    def evaluate(
+        self, recordings: Recordings, *, load: Load | str | PathLike[str] | None = None
+    ) -> IdentifiedDrive:
+        """The same drive with the errors of its free runs through other recordings; nothing is fitted.
+
+        load: that of these recordings, if it is another one (docs/use/known_load.md).
+        """
+        return IdentifiedDrive(self._core.evaluate(recordings, load), recordings)
+
+    def write(
+        self,
+        target: str,
+        path: str | PathLike[str],
+        *,
+        recordings: Recordings | None = None,
+        name: str = "servo",
+        starts: int = 3,
+    ) -> float:
+        """Writes the drive for another program, refitted in its equations; returns the error there in rad.
+
+        target: bam, mjcf or isaaclab.
+        recordings: to which it is fitted; without them those of `identify` or `evaluate`.
+        """
+        used = self._recordings if recordings is None else recordings
+        if used is None:
+            raise UsageError("write: a drive that was read from a file needs recordings=, to which it is refitted")
+        return self._core.write(target, path, used, name, starts)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes a file for `read_drive` and `torsio identify --from`."""
+        self._core.save(path)
+
+    def to_json(self) -> str:
+        """The document of `torsio identify --json`, which `save` writes."""
+        return self._core.document_json()
+
+    def to_pandas(self) -> Any:
+        """A DataFrame with a row for each parameter."""
+        return _data_frame([vars(row) for row in self.parameters.values()])
+
+    def __repr__(self) -> str:
+        error = self.mae_rad if math.isnan(self.held_out_mae_rad) else self.held_out_mae_rad
+        return f"<IdentifiedDrive: {self._document['law']}, {len(self.parameters)} parameters, {error:.4f} rad>"
+
+    def __str__(self) -> str:
+        return self._core.text()
+
+    def _repr_html_(self) -> str:
+        columns = ["name", "value", "standard_error", "lowest_95", "highest_95"]
+        rows = [[getattr(row, column) for column in columns] for row in self.parameters.values()]
+        return _table_html(columns, rows, repr(self))
+
+
+_NOT_NUMBERS = ("name", "is_determined", "is_at_bound")
+
+
+def identify(
+    recordings: Recordings,
+    *,
+    load: Load | str | PathLike[str],
+    drive: str | PathLike[str] | None = None,
+    terms: str | Sequence[str] = "auto",
+    spring: bool = False,
+    group_by: str = "",
+    starts: int = 3,
+    seed: int = 1,
+    standard_errors: bool = True,
+    nested: bool = True,
+) -> IdentifiedDrive:
+    """Finds motor, friction and spring of a joint from its command, one angle and a known load (docs/use/identify.md).
+
+    load: load file, which gives the torque its scale (docs/use/known_load.md).
+    drive: drive file with the law; without it the channels suggest one.
+    terms: "auto" (chosen by recordings that are left out), or names: ["delay", "load_friction"].
+    spring: "auto" begins with a second mass and its spring.
+    group_by: condition whose equal values are left out together, or "recording".
+    standard_errors, nested: without them the fits that these need are saved.
+    Equal arguments give equal results. Ctrl-C stops it.
+    """
+    names = terms.split(",") if isinstance(terms, str) else list(terms)
+    chosen = None if names == ["auto"] else [name.strip() for name in names]
+    core = _core.identify(
+        recordings, load, drive, chosen, spring, group_by, starts, seed, standard_errors, nested
+    )
+    return IdentifiedDrive(core, recordings)
+
+
+def read_drive(path: str | PathLike[str]) -> IdentifiedDrive:
+    """A drive from the file of `IdentifiedDrive.save` or `torsio identify -o`."""
+    return IdentifiedDrive(_core.read_drive(path))
