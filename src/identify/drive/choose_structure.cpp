@@ -11,7 +11,7 @@ namespace {
 
 // A term goes if the held-out error falls by this share without it, and by one standard error of the recordings'
 // differences. A term that hardly changes the fit goes even if the held-out error only does not rise.
-constexpr double kIdle = 1.03;  // share of the loss of training without the term
+constexpr double kIdle = 1.01;  // share of the loss of training without the term
 constexpr double kLeastFall = 0.03;
 constexpr std::size_t kCandidates = 3;  // terms whose held-out errors are computed
 

@@ -37,7 +37,7 @@ struct ChosenStructure {
 
 /// From all terms of `largest` one after the other is taken out, that whose absence costs least, as long as the held-out
 /// error falls by 3 % and by one standard error of the recordings' differences: a weak prior holds
-/// the other terms. A term whose absence raises neither the held-out error nor, by 3 %, the loss of training goes, too.
+/// the other terms. A term whose absence raises neither the held-out error nor, by 1 %, the loss of training goes, too.
 [[nodiscard]] ChosenStructure choose_structure(const GroupedLogs& logs, const DriveTerms& largest,
                                                const DriveFitOptions& options, std::size_t threads);
 

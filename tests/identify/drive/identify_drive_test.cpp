@@ -9,6 +9,7 @@
 
 #include "identify/drive/servo_recordings.hpp"
 #include "numerics/student_t.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -71,15 +72,45 @@ TEST(IdentifyDrive, KeepsFrictionThatGrowsWithTheLoadAndNoTermThatDoesNotGain) {
   servo.load_friction = 0.12;
   const std::vector<Recording> recordings = servo_recordings(servo);
   const DriveTerms largest =
-      drive_terms({DriveTerm::base, DriveTerm::load_friction, DriveTerm::resistance_rise});
+      drive_terms({DriveTerm::base, DriveTerm::load_friction, DriveTerm::stribeck});
   const DriveIdentification found =
       identify_drive(recordings, pendulum(), assumed_drive_sheet(recordings.front()),
                      {.largest = largest, .has_standard_errors = false});
   EXPECT_TRUE(has(found.terms, DriveTerm::load_friction));
-  EXPECT_FALSE(has(found.terms, DriveTerm::resistance_rise));
+  EXPECT_FALSE(has(found.terms, DriveTerm::stribeck));
   EXPECT_NEAR(value_of(found, DriveParameter::load_friction), servo.load_friction,
               0.1 * servo.load_friction);
   EXPECT_LT(found.nested_mae_rad, 0.02);
+}
+
+TEST(IdentifyDrive, TakesAPayloadOnAJointOfAUrdfAsThePendulumThatItIs) {
+  const TemporaryFolder folder;
+  (void)folder.file("servo.urdf", R"(<robot name="servo">
+  <link name="base"/>
+  <joint name="servo" type="revolute">
+    <parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="1" velocity="10"/>
+  </joint>
+  <link name="rod">
+    <inertial><mass value="1e-9"/><inertia ixx="1e-9" iyy="1e-9" izz="1e-9" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+</robot>)");
+  const LoadSheet urdf =
+      read_load_sheet(folder.file("load.yaml",
+                                  "load: {urdf: servo.urdf, joint: servo, payload: {link: rod, "
+                                  "mass: 0.5kg, at: [0, 0, -0.1]}}"));
+  const std::vector<Recording> recordings = servo_recordings({});
+  const DriveSheet drive = assumed_drive_sheet(recordings.front());
+  const IdentifyOptions options{.terms = kBaseAndDelay, .starts = 1, .has_standard_errors = false};
+  const DriveIdentification by_urdf = identify_drive(recordings, urdf, drive, options);
+  const DriveIdentification by_pendulum = identify_drive(recordings, pendulum(), drive, options);
+  for (const IdentifiedDriveParameter& parameter : by_pendulum.parameters) {
+    const DriveParameterInfo& info =
+        drive_parameters()[static_cast<std::size_t>(parameter.parameter)];
+    if (!info.is_positive) continue;
+    EXPECT_NEAR(value_of(by_urdf, parameter.parameter), parameter.value, 0.01 * parameter.value)
+        << info.name;
+  }
 }
 
 TEST(IdentifyDrive, DoesNotDependOnTheNumberOfThreads) {
