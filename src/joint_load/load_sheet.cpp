@@ -129,22 +129,21 @@ void require_range(const YamlValue& load, std::string_view key, double value, do
 void require_ranges(const YamlValue& load, const LoadSheet& sheet) {
   constexpr double kMost = 1e6;
   require_range(load, "joint_inertia", sheet.joint_inertia_kg_m2.value, 0.0, kMost,
-                "an inertia that is not negative");
+                "an inertia from 0kg_m2 to 1e6kg_m2");
   require_range(load, "zero", sheet.zero_rad.value, -rad_from_deg(360.0), rad_from_deg(360.0),
                 "an angle from -360deg to 360deg");
   const auto* const facts = std::get_if<PendulumFacts>(&sheet.facts);
   if (facts == nullptr) {
     if (const auto payload = load.find("payload"))
       require_range(*payload, "mass", std::get<UrdfFacts>(sheet.facts).payload_mass_kg.value, 0.0,
-                    kMost, "a mass that is not negative");
+                    kMost, "a mass from 0kg to 1e6kg");
     return;
   }
   const YamlValue pendulum = load.at("pendulum");
-  require_range(pendulum, "mass", facts->mass_kg.value, 0.0, kMost, "a mass that is not negative");
-  require_range(pendulum, "length", facts->length_m.value, 0.0, kMost,
-                "a length that is not negative");
+  require_range(pendulum, "mass", facts->mass_kg.value, 0.0, kMost, "a mass from 0kg to 1e6kg");
+  require_range(pendulum, "length", facts->length_m.value, 0.0, kMost, "a length from 0m to 1e6m");
   require_range(pendulum, "arm_mass", facts->arm_mass_kg.value, 0.0, kMost,
-                "a mass that is not negative");
+                "a mass from 0kg to 1e6kg");
   require_range(pendulum, "inclination", facts->inclination_rad.value, -rad_from_deg(90.0),
                 rad_from_deg(90.0),
                 "an angle from -90deg to 90deg, of the axis from the horizontal");

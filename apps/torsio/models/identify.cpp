@@ -12,6 +12,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/identify/drive/drive_file.hpp"
@@ -50,16 +51,20 @@ torsio::DriveTerms terms_of(const std::string& text) {
   for (const std::string& wanted : torsio::split_inputs(text)) {
     bool is_known = false;
     known.clear();
+    std::vector<std::string_view> names;
     for (std::size_t k = 0; k < torsio::kDriveTerms; ++k) {
       const std::string_view term = torsio::name(static_cast<torsio::DriveTerm>(k));
+      names.push_back(term);
       known += (known.empty() ? "" : ", ") + std::string(term);
       if (term != wanted) continue;
       terms.set(k);
       is_known = true;
     }
     if (!is_known)
-      throw torsio::UsageError(
-          {.place = "--terms", .expected = "auto, or terms of " + known, .found = wanted});
+      throw torsio::UsageError({.place = "--terms",
+                                .expected = "auto, or terms of " + known,
+                                .found = wanted,
+                                .advice = torsio::did_you_mean(wanted, names)});
   }
   return terms;
 }
@@ -77,9 +82,11 @@ torsio::IdentifyOptions options_of(const DriveIdentifyFlags& flags,
                                   .progress = progress};
   if (!flags.step.empty()) {
     options.step_s = torsio::si_quantity(flags.step, "s", "--step");
-    if (!(options.step_s > 0.0))
+    constexpr double kShortest_s = 1e-5;
+    constexpr double kLongest_s = 0.1;
+    if (!(options.step_s >= kShortest_s && options.step_s <= kLongest_s))
       throw torsio::UsageError(
-          {.place = "--step", .expected = "a time above 0", .found = flags.step});
+          {.place = "--step", .expected = "a time from 0.01ms to 100ms", .found = flags.step});
   }
   if (flags.terms != "auto")
     options.terms = terms_of(flags.terms);
@@ -114,6 +121,7 @@ std::string written_text(const std::string& target, const std::string& file,
 }
 
 void check_call(DriveIdentifyFlags& flags) {
+  (void)options_of(flags, {});
   const bool has_load = !flags.load.empty() || !flags.from.empty();
   if (flags.data.recordings.empty() || !has_load)
     throw torsio::UsageError(
@@ -244,7 +252,8 @@ void add_identify(CLI::App& app) {
   verb->add_option("--step", flags->step,
                    "longest step of the integrator (default: 2.5ms; with a spring 1ms)");
   verb->add_option("--threads", flags->threads,
-                   "threads; the result does not depend on it (default: all)");
+                   "threads; the result does not depend on it (default: all)")
+      ->check(CLI::Range(0, 1024));
   verb->add_flag("--no-standard-errors", flags->without_errors,
                  "skip the fits without one recording each");
   verb->add_flag("--no-nested", flags->without_nested,

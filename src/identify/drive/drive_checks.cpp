@@ -135,6 +135,36 @@ void check_load(const std::vector<DriveLog>& logs, const std::vector<Course>& co
                     least, largest));
 }
 
+/// Angles of a load that hangs, whose numbers are rather degrees.
+void check_turns(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
+                 Findings& findings) {
+  constexpr double kManyTurns_rad = 8.0 * std::numbers::pi;
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    if (courses[k].angle_range_rad < kManyTurns_rad || logs[k].load.load.gravity_Nm <= 0.0)
+      continue;
+    return findings.warn(
+        "angle", fmt::format("The joint turns by {:.3g} rad, {:.0f} turns of a load that hangs. If "
+                             "the log is in degrees, its column is joint_angle_deg, or "
+                             "'unit: deg' in a mapping.",
+                             courses[k].angle_range_rad,
+                             courses[k].angle_range_rad / (2.0 * std::numbers::pi)));
+  }
+}
+
+/// One drive is identified at a time; a log of BAM names its motor.
+void check_motors(const std::vector<Recording>& recordings, Findings& findings) {
+  std::map<std::string, std::string> first_recording;  // by motor
+  for (const Recording& recording : recordings)
+    for (const auto& [label, text] : recording.labels)
+      if (label == "motor") first_recording.try_emplace(text, recording.name());
+  if (first_recording.size() < 2) return;
+  std::string motors;
+  for (const auto& [motor, recording] : first_recording)
+    motors += fmt::format("{}{} in {}", motors.empty() ? "" : ", ", motor, recording);
+  findings.fail("motor", "The recordings are of different motors: " + motors +
+                             ". Identify each drive from its own recordings.");
+}
+
 void check_saturation(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
                       Findings& findings) {
   double sum = 0.0;
@@ -327,6 +357,8 @@ std::vector<DriveFinding> check_drive_logs(const std::vector<Recording>& recordi
   std::vector<Course> courses;
   courses.reserve(logs.size());
   for (const DriveLog& log : logs) courses.push_back(course_of(log));
+  check_motors(recordings, findings);
+  check_turns(logs, courses, findings);
   check_command(logs, courses, findings);
   check_load(logs, courses, findings);
   check_saturation(logs, courses, findings);

@@ -229,6 +229,17 @@ std::vector<std::string> values_of(const std::vector<Recording>& recordings,
   return values;
 }
 
+/// What recordings could be grouped by.
+std::string names_of_groups(const std::vector<Recording>& recordings) {
+  std::vector<std::string> names;
+  for (const std::string& condition : recordings.front().conditions())
+    if (!values_of(recordings, condition).empty()) names.push_back(condition);
+  for (const auto& [label, text] : recordings.front().labels)
+    if (!label_of(recordings, label).empty()) names.push_back(label);
+  return names.empty() ? "recordings without conditions and labels"
+                       : "recordings with " + joined(names);
+}
+
 }  // namespace
 
 std::vector<std::string> drive_groups(const std::vector<Recording>& recordings,
@@ -242,7 +253,7 @@ std::vector<std::string> drive_groups(const std::vector<Recording>& recordings,
     if (!values.empty()) return values;
     throw UsageError({.place = "--group-by " + group_by,
                       .expected = "a condition or a label that all recordings have, or 'recording'",
-                      .found = "recordings without it"});
+                      .found = names_of_groups(recordings)});
   }
   constexpr std::size_t kManyRecordings = 6;
   if (group_by == "recording" || recordings.size() <= kManyRecordings) return own;

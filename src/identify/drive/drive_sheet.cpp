@@ -1,9 +1,11 @@
 #include "torsio/identify/drive/drive_sheet.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <string>
 #include <utility>
 
@@ -13,6 +15,7 @@
 #include "data/yaml_reader.hpp"
 #include "joint_load/load_fact.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -23,6 +26,9 @@ constexpr std::array<std::pair<std::string_view, DriveLaw>, 5> kLaws{
      {"voltage", DriveLaw::voltage},
      {"current", DriveLaw::current},
      {"torque", DriveLaw::torque}}};
+
+constexpr double kHighestSupply_V = 1e5;
+constexpr double kHighestGain_Nm_rad = 1e7;
 
 DriveLaw law_of(const YamlValue& value) {
   const std::string text = value.text();
@@ -41,6 +47,26 @@ void require_keys(const YamlValue& drive, DriveLaw law) {
   if (law == DriveLaw::voltage) with({"supply", "off"});
   if (law == DriveLaw::pd) with({"kp", "kd", "torque_limit", "filter"});
   drive.allow_only(keys);
+}
+
+/// The name of a channel in one of these units.
+std::string channel_in(const YamlValue& value, std::initializer_list<std::string_view> si_units) {
+  const std::string text = value.text();
+  const auto channel = split_channel_name(text);
+  if (!channel || std::ranges::find(si_units, channel->unit->si_suffix) == si_units.end())
+    value.refuse(fmt::format("a channel whose name ends in _{}", fmt::join(si_units, " or _")));
+  return text;
+}
+
+std::string command_of(const YamlValue& value, DriveLaw law) {
+  switch (law) {
+    case DriveLaw::position:
+    case DriveLaw::pd: return channel_in(value, {"rad"});
+    case DriveLaw::voltage: return channel_in(value, {"V", "1"});
+    case DriveLaw::current: return channel_in(value, {"A"});
+    case DriveLaw::torque: break;
+  }
+  return channel_in(value, {"Nm"});
 }
 
 double positive(const YamlValue& value, std::string_view si_unit) {
@@ -66,8 +92,9 @@ void read_position(const YamlValue& drive, DriveSheet& sheet) {
 
 void read_winding(const YamlValue& drive, DriveSheet& sheet) {
   sheet.supply_V = load_fact(drive.at("supply"), "V");
-  if (sheet.supply_V.condition.empty() && !(sheet.supply_V.value > 0.0))
-    drive.at("supply").refuse("a voltage above 0");
+  if (sheet.supply_V.condition.empty() &&
+      !(sheet.supply_V.value > 0.0 && sheet.supply_V.value <= kHighestSupply_V))
+    drive.at("supply").refuse(fmt::format("a voltage above 0V, at most {:g}V", kHighestSupply_V));
   if (const auto off = drive.find("off")) {
     const std::string text = off->text();
     if (text != "open_circuit" && text != "short")
@@ -78,6 +105,10 @@ void read_winding(const YamlValue& drive, DriveSheet& sheet) {
 
 void read_pd(const YamlValue& drive, DriveSheet& sheet) {
   sheet.kp_Nm_rad = load_fact(drive.at("kp"), "Nm_rad");
+  if (sheet.kp_Nm_rad.condition.empty() &&
+      !(sheet.kp_Nm_rad.value > 0.0 && sheet.kp_Nm_rad.value <= kHighestGain_Nm_rad))
+    drive.at("kp").refuse(
+        fmt::format("a gain above 0Nm/rad, at most {:g}Nm/rad", kHighestGain_Nm_rad));
   if (const auto kd = drive.find("kd")) sheet.kd_Nms_rad = load_fact(*kd, "Nms_rad");
   if (const auto limit = drive.find("torque_limit"))
     sheet.torque_limit_Nm = load_fact(*limit, "Nm");
@@ -93,8 +124,8 @@ DriveSheet sheet_from(const YamlValue& root, const std::string& name) {
   sheet.file = name;
   sheet.law = law_of(drive.at("law"));
   require_keys(drive, sheet.law);
-  if (const auto command = drive.find("command")) sheet.command = command->text();
-  if (const auto angle = drive.find("angle")) sheet.angle = angle->text();
+  if (const auto command = drive.find("command")) sheet.command = command_of(*command, sheet.law);
+  if (const auto angle = drive.find("angle")) sheet.angle = channel_in(*angle, {"rad"});
   if (const auto ratio = drive.find("gear_ratio")) {
     const double value = ratio->plain_number(1e5);
     if (!(value > 0.0)) ratio->refuse("a ratio above 0");
@@ -132,7 +163,7 @@ DriveSheet read_drive_sheet(const std::string& path) {
 DriveSheet assumed_drive_sheet(const Recording& recording) {
   const auto has = [&](std::string_view channel) { return recording.has(channel); };
   DriveSheet sheet;
-  sheet.file = "no drive file";
+  sheet.file = "the drive assumed without --drive";
   if (has("goal_angle_rad") && has("kp_Nm_rad")) {
     sheet.law = DriveLaw::pd;
     sheet.kp_Nm_rad.condition = "kp_Nm_rad";
