@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "report/drive_advice_json.hpp"
 #include "report/json_text.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
@@ -105,7 +106,8 @@ Verdict worst(const std::vector<Finding>& findings) {
   return verdict;
 }
 
-std::string check_json(const std::vector<Finding>& findings, const Advice* advice) {
+std::string check_json(const std::vector<Finding>& findings, const Advice* advice,
+                       const std::vector<DriveAdvice>& drive_advice) {
   Json document{{"verdict", name(worst(findings))}, {"findings", Json::array()}};
   for (const Finding& finding : findings)
     document["findings"].push_back({{"verdict", name(finding.verdict)},
@@ -114,6 +116,7 @@ std::string check_json(const std::vector<Finding>& findings, const Advice* advic
                                     {"message", finding.message},
                                     {"advice", finding.advice}});
   if (advice != nullptr) document["advice"] = advice_json(*advice);
+  if (!drive_advice.empty()) document["drive_advice"] = drive_advice_json(drive_advice);
   return json_text(document);
 }
 

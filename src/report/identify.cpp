@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "identify/drive/drive_document.hpp"
+#include "report/drive_advice_json.hpp"
 #include "report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
@@ -125,14 +126,19 @@ std::string drive_advice_text(const std::vector<DriveAdvice>& advice) {
   return drive_advice_table(advice).text();
 }
 
+DriveJson drive_advice_json(const std::vector<DriveAdvice>& advice) {
+  DriveJson list = DriveJson::array();
+  for (const DriveAdvice& row : advice)
+    list.push_back({{"recording", row.recording},
+                    {"parameter", drive_parameters()[static_cast<std::size_t>(row.parameter)].name},
+                    {"standard_error_ratio", row.standard_error_ratio}});
+  return list;
+}
+
 std::string identification_json(const DriveIdentification& identified,
                                 const std::vector<DriveAdvice>& advice) {
   DriveJson document = drive_document(identified);
-  for (const DriveAdvice& row : advice)
-    document["advice"].push_back(
-        {{"recording", row.recording},
-         {"parameter", drive_parameters()[static_cast<std::size_t>(row.parameter)].name},
-         {"standard_error_ratio", row.standard_error_ratio}});
+  if (!advice.empty()) document["advice"] = drive_advice_json(advice);
   return json_text(document);
 }
 

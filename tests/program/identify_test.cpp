@@ -63,5 +63,29 @@ TEST_F(IdentifyProgram, RefusesALawThatTheValuesAreNotOf) {
   EXPECT_NE(outcome.err.find("expected the law 'pd'"), std::string::npos) << outcome.err;
 }
 
+/// The recordings of a drive without a spring: the command, one angle and the conditions.
+constexpr const char* kOneAngle =
+    "mapping: {drop: [gear_angle_rad, joint_angle_rad, torque_Nm, torque_fresh_1]}\n"
+    "target: motor_angle_rad\nfiles: [air1.csv, air2.csv]\n";
+
+TEST_F(IdentifyProgram, IsAdvisedByTheCheckOfADriveWithoutASpring) {
+  record(2);
+  (void)folder_.file("drive.yaml", kOneAngle);
+  const Outcome outcome =
+      torsio("check drive.yaml --load load.yaml --advise --json check.json --report check.html");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("the drive is identified for the advice"), std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.out.find("WARN  drive: recordings"), std::string::npos) << outcome.out;
+  const auto advice = nlohmann::json::parse(contents("check.json")).at("drive_advice");
+  ASSERT_GE(advice.size(), 3U);
+  EXPECT_LT(advice.front().at("standard_error_ratio").get<double>(), 1.0);
+  EXPECT_NE(outcome.out.find(advice.front().at("recording").get<std::string>()), std::string::npos);
+  EXPECT_NE(contents("check.html").find("What to record next for torsio identify"),
+            std::string::npos);
+  EXPECT_EQ(torsio("check drive.yaml --load load.yaml --drive law.yaml").exit_code, kCallWasWrong);
+  EXPECT_EQ(torsio("check drive.yaml --advise --drive law.yaml").exit_code, kCallWasWrong);
+}
+
 }  // namespace
 }  // namespace torsio::test

@@ -12,6 +12,8 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "data/log_summary.hpp"
+#include "recordings/check_drive.hpp"
+#include "report/identify.hpp"
 #include "report/log_summary.hpp"
 #include "torsio/check/advise/advice.hpp"
 #include "torsio/core/error.hpp"
@@ -29,6 +31,7 @@ struct CheckFlags {
   bool advise = false;
   bool list = false;
   std::vector<std::string> want;
+  std::string drive;  ///< drive file, for the advice on a drive
   JsonOutput json;
   ReportOutput report;
 };
@@ -48,7 +51,25 @@ struct Checked {
   std::optional<torsio::Advice> advice;
   std::optional<torsio::Dataset> dataset = {};  ///< none: it could not be read
   torsio::FeatureSpec spec = {};
+  std::vector<torsio::DriveAdvice> drive_advice = {};
 };
+
+void add_drive(CheckedDrive drive, Checked& result) {
+  std::ranges::move(drive.findings, std::back_inserter(result.findings));
+  result.drive_advice = std::move(drive.advice);
+}
+
+/// The drive of recordings of a spring: what is wrong with it does not concern the model of the spring.
+void check_drive_too(const CheckFlags& flags, const torsio::DriveSheet& law,
+                     const torsio::Progress& progress, Checked& result) {
+  try {
+    add_drive(checked_drive(*result.dataset, flags.data.load_file, law, progress), result);
+  } catch (const torsio::Cancelled&) {
+    throw;
+  } catch (const torsio::Error& error) {
+    result.findings.push_back({torsio::Verdict::warn, "drive", "", error.what(), ""});
+  }
+}
 
 std::vector<torsio::WantedRange> wanted_of(const CheckFlags& flags, const torsio::Dataset& dataset,
                                            const torsio::FeatureSpec& spec) {
@@ -63,6 +84,14 @@ Checked checked(const CheckFlags& flags) {
   try {
     ProgressBar progress;
     torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
+    std::optional<torsio::DriveSheet> law;
+    if (flags.advise && !flags.data.load_file.empty()) law = law_to_check(dataset, flags.drive);
+    if (law && lacks_deflection(dataset)) {
+      Checked result{.findings = {{torsio::Verdict::pass, "clock", "", "uniform", ""}},
+                     .advice = {}};
+      add_drive(checked_drive(dataset, flags.data.load_file, *law, progress.listener()), result);
+      return result;
+    }
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
     for (const torsio::DatasetRecord& record : dataset.records)
       if (!record.recording.labels.empty()) remark(torsio::labels_text(record.recording));
@@ -74,6 +103,8 @@ Checked checked(const CheckFlags& flags) {
       result.advice = torsio::advise(dataset, spec, wanted, progress.listener());
     result.dataset = std::move(dataset);
     result.spec = spec;
+    if (law && torsio::worst(result.findings) != torsio::Verdict::fail)
+      check_drive_too(flags, *law, progress.listener(), result);
     return result;
   } catch (const torsio::ClockError& error) {
     const std::string_view message = error.what();
@@ -103,8 +134,14 @@ void run(CheckFlags& flags) {
     throw torsio::UsageError({.place = "--want",
                               .problem = "it states the intended use for --advise",
                               .advice = "Add --advise."});
+  if (!flags.drive.empty() && (!flags.advise || flags.data.load_file.empty()))
+    throw torsio::UsageError({.place = "--drive",
+                              .problem = "it states the drive whose next recording is proposed",
+                              .advice = "Add --advise and --load load.yaml."});
+  std::vector<std::string> inputs = flags.test;
+  if (!flags.drive.empty()) inputs.push_back(flags.drive);
   flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot},
-                           flags.test);
+                           inputs);
   const Checked result = checked(flags);
   const torsio::Verdict verdict = torsio::worst(result.findings);
   if (flags.json.wants_tables()) {
@@ -115,12 +152,16 @@ void run(CheckFlags& flags) {
                                                            "warnings"
                                                          : "a model can be trained on this"));
     if (result.advice) print("\n" + torsio::advice_text(*result.advice));
+    if (!result.drive_advice.empty())
+      print("\nwhat to record next for torsio identify\n" +
+            torsio::drive_advice_text(result.drive_advice));
   }
   const torsio::Advice* const advice = result.advice ? &*result.advice : nullptr;
-  flags.json.write(torsio::check_json(result.findings, advice));
+  flags.json.write(torsio::check_json(result.findings, advice, result.drive_advice));
   if (flags.report.is_wanted())
-    flags.report.write(torsio::check_report(
-        result.findings, result.dataset ? &*result.dataset : nullptr, result.spec, advice));
+    flags.report.write(torsio::check_report(result.findings,
+                                            result.dataset ? &*result.dataset : nullptr,
+                                            result.spec, advice, result.drive_advice));
   if (verdict == torsio::Verdict::fail)
     throw torsio::Error({.problem = "the recordings did not pass",
                          .advice = flags.advise ? "There is no advice on further recordings until "
@@ -139,13 +180,15 @@ void add_check(CLI::App& app) {
       "         torsio check sweep*.csv --advise --want input=-5deg:5deg --want "
       "frequency=0.05Hz:2Hz\n"
       "--advise divides the recordings into strokes and fits a quick model with some of them left\n"
-      "out: docs/use/advise.md.");
+      "out: docs/use/advise.md. With --load it also proposes recordings for torsio identify.");
   flags->data.add_recordings(*verb, "recordings, or a manifest");
   flags->data.add_mapping(*verb);
   flags->data.add_target_and_inputs(*verb);
   flags->data.add_load(*verb,
                        "load file: the target is the torque of this known load "
                        "(docs/use/known_load.md)");
+  verb->add_option("--drive", flags->drive,
+                   "with --advise and --load: file of the drive's law (default: by the channels)");
   verb->add_option("--test", flags->test,
                    "held-out recordings: are they inside the training range?");
   verb->add_flag(

@@ -6,6 +6,7 @@
 #include "report/html/model_report.hpp"
 #include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
+#include "report/identify.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -53,7 +54,8 @@ TimeFigure loop_signals(const Recording& record) {
 }  // namespace
 
 ReportDocument check_report(const std::vector<Finding>& findings, const Dataset* dataset,
-                            const FeatureSpec& spec, const Advice* advice) {
+                            const FeatureSpec& spec, const Advice* advice,
+                            const std::vector<DriveAdvice>& drive_advice) {
   const Verdict verdict = worst(findings);
   ReportDocument document{
       .title = "Check of recordings",
@@ -77,6 +79,9 @@ ReportDocument check_report(const std::vector<Finding>& findings, const Dataset*
   if (advice != nullptr)
     document.sections.push_back(
         {.heading = "What to record next", .preformatted = advice_text(*advice)});
+  if (!drive_advice.empty())
+    document.sections.push_back({.heading = "What to record next for torsio identify",
+                                 .tables = {report_table(drive_advice_table(drive_advice))}});
   if (dataset == nullptr) return document;
   constexpr std::size_t kRecordings = 6;
   for (std::size_t r = 0; r < std::min(dataset->records.size(), kRecordings); ++r) {

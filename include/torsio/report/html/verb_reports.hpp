@@ -51,10 +51,11 @@ namespace torsio {
                                       const Dataset& dataset, const Progress& progress = {});
 
 /// Each finding, and the channels of each recording with the findings that have a place in it.
-/// @param dataset none: it could not be read, which is a finding
+/// @param dataset none: it could not be read, which is a finding, or it has no spring
 [[nodiscard]] ReportDocument check_report(const std::vector<Finding>& findings,
                                           const Dataset* dataset, const FeatureSpec& spec,
-                                          const Advice* advice);
+                                          const Advice* advice,
+                                          const std::vector<DriveAdvice>& drive_advice = {});
 
 /// Inputs, estimate with its error bar, and faults of each recording.
 [[nodiscard]] ReportDocument estimate_report(const std::vector<EstimatedRecording>& estimated,
