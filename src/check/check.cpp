@@ -64,7 +64,10 @@ void Checker::run_checks(bool with_warnings) {
   check_missing();
   check_constant();
   check_coding();
-  if (with_warnings) check_saturation();
+  if (with_warnings)
+    check_saturation();
+  else
+    check_hidden_torque();
   check_frozen();
   if (with_warnings) {
     check_resolution();

@@ -13,6 +13,9 @@ namespace torsio {
 
 namespace {
 
+constexpr double kFewMissing = 1e-3;   // share of the samples
+constexpr double kSlowerSensor = 0.4;  // its cells are empty between its samples
+
 /// Means over the `half_window` samples before and after each; NaN where one of them is.
 std::vector<double> without_noise(const std::vector<double>& values, std::size_t half_window) {
   std::vector<double> means(values.size());
@@ -90,13 +93,18 @@ void Checker::check_missing() {
       if (missing == 0) return;
       const double share =
           static_cast<double>(missing) / static_cast<double>(channel.values.size());
-      add(is_target && share < 1.0 ? Verdict::warn : Verdict::fail, "missing values",
-          recording.name(),
-          fmt::format("{}: {} of {} samples are NaN", channel.name, missing, channel.values.size()),
-          is_target
-              ? "They are neither trained on nor scored."
-              : fmt::format("An input must have every value. If it is a slower sensor: hold: [{}]",
-                            channel.name),
+      const bool is_slower = share > kSlowerSensor;
+      Verdict verdict = is_target && share < 1.0 ? Verdict::warn : Verdict::fail;
+      if (is_target && share < kFewMissing) verdict = Verdict::pass;
+      std::string advice =
+          is_target ? "They are neither trained on nor scored." : "An input must have every value.";
+      if (!is_target || is_slower)
+        advice += fmt::format(" If it is a slower sensor: hold: [{}]", channel.name);
+      add(verdict, "missing values", recording.name(),
+          fmt::format("{}: {} of {} samples are NaN{}", channel.name, missing,
+                      channel.values.size(),
+                      verdict == Verdict::pass ? ", neither trained on nor scored" : ""),
+          verdict == Verdict::pass ? "" : advice,
           ranges_where(channel, [](double value) { return !is_finite(value); }));
     });
   });

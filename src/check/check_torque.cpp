@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "check/checker.hpp"
 #include "check/signal_faults.hpp"
@@ -10,6 +13,11 @@
 #include "torsio/core/units.hpp"
 
 namespace torsio {
+namespace {
+
+constexpr double kMostOnPlateau = 2.0 / 3.0;  // share of the samples
+
+}  // namespace
 
 /// Whether the torque has lost its sign, which is reported.
 bool Checker::has_lost_sign(std::size_t r) {
@@ -27,11 +35,41 @@ bool Checker::has_lost_sign(std::size_t r) {
   return true;
 }
 
+std::optional<Plateau> Checker::plateau_of(std::size_t r) const {
+  const Recording& recording = dataset_.records[r].recording;
+  const Channel& target = recording.channel(dataset_.target);
+  if (spoiled_[r] != 0 || new_samples(target).size() < kFewestSamples) return {};
+  return find_plateau(pairs_[r], usual_noise(noise_course(target, recording.sample_rate_Hz())));
+}
+
+void Checker::report_plateau(std::size_t r, const Plateau& plateau) {
+  std::vector<SampleRange> places;
+  for (const Rest& rest : plateau.samples) places.push_back({rest.begin, rest.end});
+  add(plateau.share >= kMostOnPlateau ? Verdict::fail : Verdict::warn, "saturation",
+      dataset_.records[r].recording.name(),
+      fmt::format("{}: {:.1f} % of the samples lie within its noise at its lowest and highest "
+                  "values, while {} moves through {:.0f} % of its range",
+                  dataset_.target, 100.0 * plateau.share, spec_.inputs.front(),
+                  100.0 * plateau.input_share),
+      "If that is the limit of the sensor, record again with a larger range or smaller loads, or "
+      "cut those parts out.",
+      std::move(places));
+}
+
+// With two thirds of the target hidden, a model would be that of the sensor's limit.
+void Checker::check_hidden_torque() {
+  for_each_record([&](std::size_t r) {
+    const auto plateau = plateau_of(r);
+    if (plateau && plateau->share >= kMostOnPlateau) report_plateau(r, *plateau);
+  });
+}
+
 // The converter after an amplifier adds noise, so that no two samples at its limit are equal.
 void Checker::check_limit(std::size_t r) {
   const Recording& recording = dataset_.records[r].recording;
   const Channel& target = recording.channel(dataset_.target);
   if (spoiled_[r] != 0 || new_samples(target).size() < kFewestSamples) return;
+  if (const auto plateau = plateau_of(r)) return report_plateau(r, *plateau);
   const auto limit =
       find_limit(pairs_[r], usual_noise(noise_course(target, recording.sample_rate_Hz())));
   if (!limit) return;

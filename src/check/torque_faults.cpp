@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "check/hysteresis_fit.hpp"
@@ -21,7 +22,11 @@ constexpr double kLeastZone = 0.005;  ///< share of the range
 constexpr double kHiddenShare = 0.05;
 constexpr double kHiddenOverZone = 5.0;
 constexpr std::size_t kFewestVisits = 3;
-constexpr double kAway = 0.2;  ///< share of the range between two visits
+constexpr double kAway = 0.2;            ///< share of the range between two visits
+constexpr double kOnPlateau = 0.3;       ///< share of the samples
+constexpr double kBeyondPlateau = 2e-3;  ///< share of the samples
+constexpr double kWidestZone = 0.1;      ///< share of the range
+constexpr double kMovesOnPlateau = 0.3;  ///< share of the input's range
 constexpr std::size_t kFewestStrokes = 5;
 constexpr double kLeastAngle_rad = 1.0;
 constexpr double kLeastUnexplained = 1e-4;
@@ -119,6 +124,41 @@ std::optional<LostSign> find_lost_sign(const Pair& pair) {
   if (!(lost.together >= kFoldedTogether) || std::min(above, known - above) < kOnEachSide * known)
     return {};
   return lost;
+}
+
+std::optional<Plateau> find_plateau(const Pair& pair, double noise) {
+  const double input_width = known_extents(pair).first.width();
+  std::vector<double> sorted;
+  std::ranges::copy_if(pair.target, std::back_inserter(sorted),
+                       [](double value) { return is_finite(value); });
+  if (sorted.empty() || !(input_width > 0.0)) return {};
+  std::ranges::sort(sorted);
+  // Not the extremes themselves, which a single wrong value may be.
+  const auto beyond = static_cast<std::size_t>(kBeyondPlateau * static_cast<double>(sorted.size()));
+  const double lowest = sorted[beyond];
+  const double highest = sorted[sorted.size() - 1 - beyond];
+  const double zone = std::max(kZoneOverNoise * noise, kLeastZone * (highest - lowest));
+  if (!(zone < kWidestZone * (highest - lowest))) return {};
+  Plateau plateau;
+  plateau.input_share = 1.0;
+  for (const double end : {lowest, highest}) {
+    const auto is_there = [&](std::size_t n) { return std::abs(pair.target[n] - end) <= zone; };
+    Extent moved;
+    std::size_t there = 0;
+    for (std::size_t n = 0; n < pair.target.size(); ++n) {
+      if (!is_there(n)) continue;
+      const std::size_t begin = n;
+      for (; n < pair.target.size() && is_there(n); ++n) moved.include(pair.input[n]);
+      plateau.samples.push_back({begin, n});
+      there += n - begin;
+    }
+    const double share = static_cast<double>(there) / static_cast<double>(sorted.size());
+    if (share >= kOnEachSide)
+      plateau.input_share = std::min(plateau.input_share, moved.width() / input_width);
+    plateau.share += share;
+  }
+  const bool is_found = plateau.share >= kOnPlateau && plateau.input_share >= kMovesOnPlateau;
+  return is_found ? std::optional(plateau) : std::nullopt;
 }
 
 std::optional<Limit> find_limit(const Pair& pair, double noise) {

@@ -28,6 +28,16 @@ struct Limit {
 /// @param noise standard deviation of the target
 [[nodiscard]] std::optional<Limit> find_limit(const Pair& pair, double noise);
 
+/// Much of the target lies within its noise at its lowest and highest values, while the input moves on.
+struct Plateau {
+  double share = 0.0;        ///< samples there
+  double input_share = 0.0;  ///< what the input moves through meanwhile, of its range
+  std::vector<Rest> samples;
+};
+/// Empty with less than 30 % of the samples there, or 30 % of the input's range at each end that has a tenth of them.
+/// @param noise standard deviation of the target
+[[nodiscard]] std::optional<Plateau> find_plateau(const Pair& pair, double noise);
+
 /// A part of the target that follows the angle q of the joint and not the input: the weight of a link that bends the
 /// sensor, an encoder whose magnet is off its axis.
 struct PositionEffect {

@@ -276,6 +276,25 @@ TEST(CheckSensors, NameTheLimitOfAnAmplifierInItsNoise) {
   ASSERT_EQ(verdict_of(findings, "saturation"), Verdict::warn) << text_of(findings);
   EXPECT_NE(first_of(findings, "saturation").message.find("within its noise"), std::string::npos);
   EXPECT_EQ(verdict_of(clipped(1e3), "saturation"), Verdict::pass);
+  // With most of the torque beyond the limit a model would be that of the limit.
+  const auto hidden = clipped(3.0);
+  EXPECT_EQ(verdict_of(hidden, "saturation"), Verdict::fail) << text_of(hidden);
+}
+
+TEST(CheckSensors, PassAFewMissingTorquesAndAdviseToHoldThoseOfASlowerSensor) {
+  const auto missing = [](auto is_missing) {
+    return findings_of(alone(changed(bench_recording("missing"), [&](Channel& channel) {
+      if (channel.name != "torque_Nm") return;
+      for (std::size_t n = 0; n < channel.values.size(); ++n)
+        if (is_missing(n)) channel.values[n] = kNotMeasured;
+    })));
+  };
+  const auto two = missing([](std::size_t n) { return n < 2; });
+  EXPECT_EQ(verdict_of(two, "missing values"), Verdict::pass) << text_of(two);
+  EXPECT_NE(first_of(two, "missing values").message.find("2 of"), std::string::npos);
+  const auto slower = missing([](std::size_t n) { return n % 4 != 0; });
+  EXPECT_EQ(verdict_of(slower, "missing values"), Verdict::warn) << text_of(slower);
+  EXPECT_NE(first_of(slower, "missing values").advice.find("hold: [torque_Nm]"), std::string::npos);
 }
 
 TEST(CheckSensors, FailForTheAmountOfATorque) {
