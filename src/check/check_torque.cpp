@@ -15,7 +15,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kMostOnPlateau = 2.0 / 3.0;  // share of the samples
+constexpr double kMaxOnPlateau = 2.0 / 3.0;  // share of the samples
 
 }  // namespace
 
@@ -45,7 +45,7 @@ std::optional<Plateau> Checker::plateau_of(std::size_t r) const {
 void Checker::report_plateau(std::size_t r, const Plateau& plateau) {
   std::vector<SampleRange> places;
   for (const Rest& rest : plateau.samples) places.push_back({rest.begin, rest.end});
-  add(plateau.share >= kMostOnPlateau ? Verdict::fail : Verdict::warn, "saturation",
+  add(plateau.share >= kMaxOnPlateau ? Verdict::fail : Verdict::warn, "saturation",
       dataset_.records[r].recording.name(),
       fmt::format("{}: {:.1f} % of the samples lie within its noise at its lowest and highest "
                   "values, while {} moves through {:.0f} % of its range",
@@ -60,7 +60,7 @@ void Checker::report_plateau(std::size_t r, const Plateau& plateau) {
 void Checker::check_hidden_torque() {
   for_each_record([&](std::size_t r) {
     const auto plateau = plateau_of(r);
-    if (plateau && plateau->share >= kMostOnPlateau) report_plateau(r, *plateau);
+    if (plateau && plateau->share >= kMaxOnPlateau) report_plateau(r, *plateau);
   });
 }
 
