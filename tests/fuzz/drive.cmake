@@ -1,0 +1,1 @@
+torsio_fuzzer(drive torsio_readers)

@@ -1,0 +1,1 @@
+torsio_fuzzer(load torsio::data)
