@@ -173,8 +173,9 @@ WrittenDrive write_mjcf(const DriveIdentification& identified, const std::vector
   using enum DriveParameter;
   const DriveLog& log = logs.front();
   require_servo(DriveTarget::mjcf, log);
-  const DriveTerms kept = drive_terms(
-      {DriveTerm::base, DriveTerm::spring, DriveTerm::bearing, DriveTerm::joint_inertia});
+  // The hinge of the load turns against the motor, so that it cannot have the friction of the joint's bearing.
+  const DriveTerms kept =
+      drive_terms({DriveTerm::base, DriveTerm::spring, DriveTerm::joint_inertia});
   const Refitted fit = refitted(identified, logs, kept, 0.002, options);
   const ServoGains gains = servo_gains(log, fit.values);
   const bool has_spring = has(fit.terms, DriveTerm::spring);
@@ -188,6 +189,8 @@ WrittenDrive write_mjcf(const DriveIdentification& identified, const std::vector
   });
   if (has_passive)
     written.not_expressed.emplace_back("the open winding without power: damping remains");
+  if (log.speed_filter_rad_s > 0.0)
+    written.not_expressed.emplace_back("the low-pass of the law's speed");
   JointLoad load = log.load.load;
   load.inertia_kg_m2 += at(fit.values, joint_inertia);
   const std::string inertial = load_body(load, load.zero_rad + at(fit.values, zero));
