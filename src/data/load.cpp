@@ -54,8 +54,10 @@ void keep_needed(Mapping& mapping, const LogTable& table, std::vector<std::strin
   needed.insert(needed.end(), {"t_s", "time_s"});
   mapping.derive = needed_definitions(mapping.derive, needed);
   std::vector<std::string> left = needed;
-  for (const LogColumn& column : table.columns)
-    if (const auto name = split_channel_name(column.full_name())) left.push_back(name->si());
+  for (const LogColumn& column : table.columns) {
+    const std::string full_name = column.full_name();  // `name` refers to it
+    if (const auto name = split_channel_name(full_name)) left.push_back(name->si());
+  }
   std::erase_if(mapping.channels, [&](const ChannelRule& rule) {
     const auto name = split_channel_name(rule.name);
     const bool is_there = table.find(rule.from) != nullptr;
