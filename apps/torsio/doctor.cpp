@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "common/output.hpp"
+#include "data/arrays/mat.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/text_table.hpp"
@@ -110,15 +111,23 @@ void run() {
   table.row({"recordings", data_text(), ""});
   table.row({"browser", browser.empty() ? "none in PATH" : browser,
              browser.empty() ? "reports are files: open them on another machine" : ""});
+  const bool has_matlab = torsio::has_mat_library();
+  table.row({"MATLAB files", has_matlab ? "read by libmatio" : "libmatio is not installed",
+             has_matlab ? "" : "to read them: apt-get install libmatio11"});
+  const std::string solver = program_in_path({"ccx"});
+  table.row({"CalculiX", solver.empty() ? "none in PATH" : solver,
+             solver.empty()
+                 ? "for design coupling and reproduce 003-coupling: apt-get install calculix-ccx"
+                 : ""});
   print(table.text());
 }
 
 }  // namespace
 
 void add_doctor(CLI::App& app) {
-  CLI::App* verb = app.add_subcommand(
-      "doctor",
-      "what this machine has for torsio: processor, real-time permissions, memory, browser");
+  CLI::App* verb = app.add_subcommand("doctor",
+                                      "what this machine has for torsio: processor, real-time "
+                                      "permissions, memory, browser, other programs");
   verb->footer("Example: torsio doctor");
   verb->callback([] { run(); });
 }

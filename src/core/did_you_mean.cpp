@@ -41,6 +41,15 @@ constexpr std::array kRenamed{
     Renamed{"003-ladder", "003-models"},
 };
 
+// Verbs of other programs.
+constexpr std::array kElsewhere{
+    Renamed{"train", "fit"},      Renamed{"learn", "fit"},         Renamed{"calibrate", "fit"},
+    Renamed{"score", "evaluate"}, Renamed{"test", "evaluate"},     Renamed{"info", "evaluate"},
+    Renamed{"show", "evaluate"},  Renamed{"predict", "estimate"},  Renamed{"cv", "crossvalidate"},
+    Renamed{"validate", "check"}, Renamed{"inspect", "check"},     Renamed{"tune", "tune-loop"},
+    Renamed{"sysid", "identify"}, Renamed{"explain", "attribute"}, Renamed{"benchmark", "bench"},
+};
+
 }  // namespace
 
 std::string did_you_mean(std::string_view wrong, std::span<const std::string_view> names) {
@@ -49,6 +58,9 @@ std::string did_you_mean(std::string_view wrong, std::span<const std::string_vie
   for (const auto& [before, now] : kRenamed)
     if (wrong == before && std::ranges::find(names, now) != names.end())
       return "It is now called '" + std::string(now) + "'.";
+  for (const auto& [elsewhere, here] : kElsewhere)
+    if (wrong == elsewhere && std::ranges::find(names, here) != names.end())
+      return "Did you mean '" + std::string(here) + "'?";
   const std::string_view* nearest = nullptr;
   std::size_t distance = kLongest;
   for (const std::string_view& name : names) {

@@ -41,8 +41,9 @@ TEST_F(BrokenCalls, NameTheNearestOfWhatThereIs) {
     expect_error(torsio(call), kCallWasWrong, "Did you mean '" + right + "'?");
   };
   suggests("fitt a.csv", "fit");
+  suggests("train a.csv", "fit");
   expect_error(torsio("track -o rows.json"), kCallWasWrong,
-               "torsio track: there is no option '-o'");
+               "torsio: track: there is no option '-o'");
   suggests("fit a.csv --modle linear -o m.safetensors", "--model");
   suggests("simulate dfki50 sweep -o a.csv", "dfki-50");
   suggests("simulate dfki-50:bouc-wenn sweep -o a.csv", "bouc-wen");

@@ -131,7 +131,8 @@ TEST_F(FirstMinute, WithoutArgumentsShowsWhatToDoFirst) {
 TEST_F(FirstMinute, DoctorNamesTheMachine) {
   const Outcome outcome = torsio("doctor");
   EXPECT_EQ(outcome.exit_code, 0);
-  for (const char* what : {"processor", "real-time priority", "locked memory", "browser"})
+  for (const char* what :
+       {"processor", "real-time priority", "locked memory", "browser", "MATLAB files", "CalculiX"})
     EXPECT_NE(outcome.out.find(what), std::string::npos) << what;
 }
 

@@ -10,11 +10,13 @@
 
 namespace {
 
-std::string refusal(std::string_view place, std::string_view kind, std::string_view wrong,
+/// @param verb "track", "arm identify"; empty: the program itself
+std::string refusal(const std::string& verb, std::string_view kind, std::string_view wrong,
                     const std::vector<std::string>& known) {
   const std::string nearest = torsio::did_you_mean(wrong, known);
-  return fmt::format("{}: there is no {} '{}'. {}{}{} --help lists them.", place, kind, wrong,
-                     nearest, nearest.empty() ? "" : " ", place);
+  return fmt::format("{}there is no {} '{}'. {}{}torsio {}--help lists them.",
+                     verb.empty() ? "" : verb + ": ", kind, wrong, nearest,
+                     nearest.empty() ? "" : " ", verb.empty() ? "" : verb + " ");
 }
 
 std::vector<std::string> names_of(const std::vector<const CLI::App*>& verbs) {
@@ -40,7 +42,7 @@ std::string unknown_option(const CLI::App& verb, const std::vector<std::string>&
 
 std::string unknown_name(const CLI::App& app, int argc, char** argv) {
   for (const CLI::App* verb : app.get_subcommands()) {
-    const std::string place = "torsio " + verb->get_name();
+    const std::string& place = verb->get_name();
     for (const CLI::App* part : verb->get_subcommands())
       return unknown_option(*part, part->remaining(), place + " " + part->get_name());
     const std::vector<std::string> left = verb->remaining();
@@ -52,6 +54,6 @@ std::string unknown_name(const CLI::App& app, int argc, char** argv) {
   }
   const std::vector<std::string> verbs = names_of(app.get_subcommands({}));
   for (const char* word : std::span(argv, static_cast<std::size_t>(argc)).subspan(1))
-    if (*word != '-') return refusal("torsio", "verb", word, verbs);
+    if (*word != '-') return refusal("", "verb", word, verbs);
   return {};
 }

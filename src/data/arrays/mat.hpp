@@ -10,6 +10,9 @@
 
 namespace torsio {
 
+/// Whether the library that reads MATLAB files is installed.
+[[nodiscard]] bool has_mat_library();
+
 /// The real and integer arrays of a MATLAB file, version 4 to 7.3, with those of nested structures:
 /// "log.motor.q_rad"; elements of an array of structures are "log/0.q_rad". Texts, cells, complex and
 /// sparse numbers are not read, but listed. Tables, timetables, timeseries, datetimes and strings are objects of

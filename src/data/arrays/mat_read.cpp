@@ -241,6 +241,8 @@ std::string send_arrays(const std::string& path, const std::vector<std::string>&
 
 }  // namespace
 
+bool has_mat_library() { return Matio().is_complete(); }
+
 ReadArrays read_mat(const std::string& path, const std::vector<std::string>& wanted,
                     const Progress& progress) {
   ReadBudget budget(path, progress);
