@@ -1,4 +1,4 @@
-#include "torsio/identify/drive/drive_friction.hpp"
+#include "identify/drive/drive_friction.hpp"
 
 #include <cmath>
 

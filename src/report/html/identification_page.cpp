@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "identify/drive/drive_document.hpp"
+#include "identify/drive/drive_friction.hpp"
 #include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "report/identify.hpp"
-#include "torsio/identify/drive/drive_friction.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio {

@@ -7,10 +7,10 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "identify/drive/drive_friction.hpp"
 #include "identify/drive/servo_recordings.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/identify/drive/drive_friction.hpp"
 
 namespace torsio {
 namespace {
