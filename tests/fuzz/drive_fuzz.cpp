@@ -26,7 +26,7 @@ bool is_usable(const torsio::DriveSheet& sheet) {
 
 }  // namespace
 
-/// Any text is the law of a drive with usable numbers, or an Error that says something.
+/// Any text is the law of a drive with usable numbers, or an Error with a text.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   try {

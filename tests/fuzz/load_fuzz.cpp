@@ -26,7 +26,7 @@ bool is_possible(const torsio::JointLoad& load) {
 
 }  // namespace
 
-/// Any text is a load of finite numbers, or an Error that says something.
+/// Any text is a load of finite numbers, or an Error with a text.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const torsio::Recording recording = recording_with_conditions();
   const std::string_view text(reinterpret_cast<const char*>(data), size);
