@@ -43,6 +43,8 @@ Study sensitivity_004(const StudyOptions& options, const Progress& progress);
 Study arm_external(const StudyOptions& options, const Progress& progress);
 Study arm_contacts(const StudyOptions& options, const Progress& progress);
 Study arm_collision(const StudyOptions& options, const Progress& progress);
+Study identify_servo_study(const StudyOptions& options, const Progress& progress);
+Study identify_spring_study(const StudyOptions& options, const Progress& progress);
 Study known_load_study(const StudyOptions& options, const Progress& progress);
 Study few_data_transfer(const StudyOptions& options, const Progress& progress);
 Study model_comparison(const StudyOptions& options, const Progress& progress);

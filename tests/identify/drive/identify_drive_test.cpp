@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -29,9 +30,8 @@ double value_of(const DriveIdentification& identified, DriveParameter parameter)
 }
 
 bool has_finding(const DriveIdentification& identified, const std::string& subject) {
-  for (const DriveFinding& finding : identified.findings)
-    if (finding.subject == subject) return true;
-  return false;
+  return std::ranges::any_of(
+      identified.findings, [&](const DriveFinding& finding) { return finding.subject == subject; });
 }
 
 std::string message_of(const std::vector<Recording>& recordings, const DriveSheet& drive) {
