@@ -243,7 +243,10 @@ WrittenDrive write_isaaclab(const DriveIdentification& identified,
   using enum DriveParameter;
   const DriveLog& log = logs.front();
   require_servo(DriveTarget::isaaclab, log);
-  const DriveTerms kept = drive_terms({DriveTerm::base, DriveTerm::delay});
+  // DCMotorCfg has the limit of the supply, DelayedPDActuatorCfg the delay, and none both.
+  const bool has_limit = has(identified.terms, DriveTerm::speed_limit);
+  const DriveTerms kept = has_limit ? drive_terms({DriveTerm::base, DriveTerm::speed_limit})
+                                    : drive_terms({DriveTerm::base, DriveTerm::delay});
   const Refitted fit = refitted(identified, logs, kept, 0.005, options);
   const ServoGains gains = servo_gains(log, fit.values);
   WrittenDrive written{.text = {},
@@ -267,10 +270,13 @@ WrittenDrive write_isaaclab(const DriveIdentification& identified,
   if (is_delayed)
     text += fmt::format("    min_delay={0},\n    max_delay={0},\n", delay_steps);
   else
-    text += fmt::format("    saturation_effort={:.9g},\n", gains.limit_Nm);
+    text += fmt::format("    saturation_effort={:.9g},\n",
+                        has_limit ? at(fit.values, stall_torque) : gains.limit_Nm);
   text += fmt::format("    effort_limit={:.9g},\n", gains.limit_Nm);
   if (log.kind == CommandKind::goal_to_duty)
     text += fmt::format("    velocity_limit={:.9g},\n", log.supply_V * log.limit / kt);
+  else if (has_limit)
+    text += fmt::format("    velocity_limit={:.9g},\n", at(fit.values, no_load_speed));
   text += fmt::format(
       "    stiffness={:.9g},\n    damping={:.9g},\n    armature={:.9g},\n    friction={:.9g},\n"
       "    viscous_friction={:.9g},\n)\n",

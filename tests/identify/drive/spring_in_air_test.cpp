@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,10 +9,13 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/identify/drive/identify_drive.hpp"
+#include "torsio/identify/drive/write_drive.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {
+
+using ::testing::HasSubstr;
 
 Recording in_air(const std::string& experiment, std::uint64_t seed) {
   ExperimentSpec spec{.actuator = "dfki-120:bouc-wen",
@@ -31,16 +35,29 @@ LoadSheet load() {
       "load.yaml");
 }
 
-// Its steps reach the speed at which the supply leaves no torque.
-TEST(SpringInTheAir, IsIdentifiedFromTheEncoderOfTheMotorAndTheCommand) {
+struct InTheAir {
+  std::vector<Recording> recordings;
+  DriveIdentification drive;
+};
+
+/// Its steps reach the speed at which the supply leaves no torque.
+const InTheAir& identified() {
   using enum DriveTerm;
-  const std::vector<Recording> recordings{in_air("air-chirp", 1), in_air("air-steps", 2)};
-  const DriveIdentification found =
-      identify_drive(recordings, load(), assumed_drive_sheet(recordings.front()),
-                     {.terms = drive_terms({base, delay, load_friction, speed_limit, spring,
-                                            hysteresis, bearing, presliding}),
-                      .starts = 2,
-                      .has_standard_errors = false});
+  static const InTheAir once = [] {
+    InTheAir made{.recordings = {in_air("air-chirp", 1), in_air("air-steps", 2)}, .drive = {}};
+    made.drive =
+        identify_drive(made.recordings, load(), assumed_drive_sheet(made.recordings.front()),
+                       {.terms = drive_terms({base, delay, load_friction, speed_limit, spring,
+                                              hysteresis, bearing, presliding}),
+                        .starts = 2,
+                        .has_standard_errors = false});
+    return made;
+  }();
+  return once;
+}
+
+TEST(SpringInTheAir, IsIdentifiedFromTheEncoderOfTheMotorAndTheCommand) {
+  const DriveIdentification& found = identified().drive;
   EXPECT_NEAR(at(found.values, DriveParameter::armature), 120.0 * 120.0 * 1.2e-4, 0.05 * 1.73);
   EXPECT_NEAR(at(found.values, DriveParameter::coulomb), 14.0, 1.0);
   EXPECT_NEAR(at(found.values, DriveParameter::no_load_speed), 48.0 / (120.0 * 0.18), 0.05 * 2.22);
@@ -56,6 +73,16 @@ TEST(SpringInTheAir, IsIdentifiedFromTheEncoderOfTheMotorAndTheCommand) {
     size += torque_Nm[n] * torque_Nm[n];
   }
   EXPECT_LT(std::sqrt(error / size), 0.1);
+}
+
+TEST(SpringInTheAir, GivesIsaacLabTheLimitOfTheSupply) {
+  const WrittenDrive lab = write_drive(DriveTarget::isaaclab, identified().drive,
+                                       identified().recordings, "elbow", {.starts = 1});
+  EXPECT_THAT(lab.text, HasSubstr("DCMotorCfg("));
+  const std::size_t at = lab.text.find("velocity_limit=");
+  ASSERT_NE(at, std::string::npos) << lab.text;
+  EXPECT_NEAR(std::stod(lab.text.substr(at + 15)), 48.0 / (120.0 * 0.18), 0.5) << lab.text;
+  EXPECT_THAT(lab.not_expressed, ::testing::Contains("delay"));
 }
 
 }  // namespace
