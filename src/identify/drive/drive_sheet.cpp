@@ -51,7 +51,7 @@ void require_keys(const YamlValue& drive, DriveLaw law) {
 
 /// The name of a channel in one of these units.
 std::string channel_in(const YamlValue& value, std::initializer_list<std::string_view> si_units) {
-  const std::string text = value.text();
+  std::string text = value.text();
   const auto channel = split_channel_name(text);
   if (!channel || std::ranges::find(si_units, channel->unit->si_suffix) == si_units.end())
     value.refuse(fmt::format("a channel whose name ends in _{}", fmt::join(si_units, " or _")));
