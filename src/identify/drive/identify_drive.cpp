@@ -96,6 +96,26 @@ void set_held_out(const GroupedLogs& all, const HeldOutStructure& held_out,
   }
 }
 
+/// The fits without a group are further starts of a rigid drive, since three do not always reach the least loss. A spring
+/// has starts of its own.
+DriveSolution best_of_starts(const GroupedLogs& all, const DriveIdentification& identified,
+                             const DriveFitOptions& options, std::size_t threads) {
+  const std::size_t more =
+      has(identified.terms, DriveTerm::spring) || all.groups < 2 ? 0 : all.groups;
+  std::vector<DriveSolution> solutions(1 + more);
+  for_each_chunk(solutions.size(), threads, [&](std::size_t k) {
+    if (k == 0) {
+      solutions[0] = fit_drive(all.logs, identified.terms, options);
+      return;
+    }
+    const auto member = std::ranges::find(all.group, k - 1) - all.group.begin();
+    solutions[k] =
+        refit_drive(all.logs, identified.terms,
+                    identified.held_out_values[static_cast<std::size_t>(member)], options);
+  });
+  return *std::ranges::min_element(solutions, {}, &DriveSolution::cost);
+}
+
 }  // namespace
 
 DriveIdentification identify_drive(const std::vector<Recording>& recordings, const LoadSheet& load,
@@ -133,7 +153,7 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
     }
   }
   identified.step_s = drive_step_s(identified.terms, fit);
-  const DriveSolution solution = fit_drive(pointers, identified.terms, fit);
+  const DriveSolution solution = best_of_starts(all, identified, fit, options.threads);
   identified.values = solution.values;
   const DriveScore score =
       score_drive(drive_problem(pointers, identified.terms, fit), solution.values);
