@@ -36,6 +36,7 @@ CandidateLog release(const DriveLog& like, const DriveIdentification& identified
   DriveLog log = like;
   const auto samples = static_cast<std::size_t>(kDuration_s / log.sample_period_s);
   log.command.assign(samples, 0.0);
+  log.command_end.clear();  // the recording may be shorter
   log.angle_rad.assign(samples, 0.0);
   log.enabled.assign(samples, 0.0);
   return {fmt::format("the mass released at {:.0f} deg from hanging, power off, {:g} s",

@@ -172,7 +172,12 @@ MeasuredDrive measured_drive(const std::vector<Recording>& recordings, const Dri
     if (!recording.has("duty_1")) continue;
     const std::vector<double>& duty = finite_channel(recording, "duty_1");
     const std::vector<double>& goal = finite_channel(recording, command_channel(recording, sheet));
-    const std::vector<double>& angle = finite_channel(recording, angle_channel(recording, sheet));
+    const std::string angle_name = angle_channel(recording, sheet);
+    std::vector<double> angle = finite_channel(recording, angle_name);
+    if (angle_name == "motor_angle_rad") {
+      const double ratio = gear_ratio(recording, sheet);
+      for (double& value : angle) value /= ratio;
+    }
     const double gain = fact_in(sheet.gain, recording, sheet.file, "gain");
     const std::vector<double> slow = slow_samples(goal, angle);
     for (std::size_t n = 0; n < duty.size(); ++n) {
