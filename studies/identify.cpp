@@ -143,8 +143,7 @@ void add_coverage(QuantityTable& table, const std::vector<Recording>& recordings
     for (std::size_t p = 0; p < halves[0].size(); ++p) {
       const IdentifiedDriveParameter& a = halves[0][p];
       const IdentifiedDriveParameter& b = halves[1][p];
-      const bool is_positive =
-          drive_parameters()[static_cast<std::size_t>(a.parameter)].is_positive;
+      const bool is_positive = drive_parameter_info(a.parameter).is_positive;
       const double difference = is_positive ? std::log(a.value / b.value) : a.value - b.value;
       const double error = is_positive
                                ? std::hypot(a.standard_error / a.value, b.standard_error / b.value)

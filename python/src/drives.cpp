@@ -52,25 +52,6 @@ std::vector<Recording> recordings_from(const py::object& items) {
   return recordings;
 }
 
-DriveTerms terms_named(const std::vector<std::string>& names) {
-  DriveTerms terms = drive_terms({DriveTerm::base});
-  for (const std::string& wanted : names) {
-    std::string known;
-    bool is_known = false;
-    for (std::size_t k = 0; k < kDriveTerms; ++k) {
-      const auto term = name(static_cast<DriveTerm>(k));
-      known += (known.empty() ? "" : ", ") + std::string(term);
-      if (term != wanted) continue;
-      terms.set(k);
-      is_known = true;
-    }
-    if (!is_known)
-      throw UsageError(
-          {.place = "terms", .expected = "'auto' or terms of " + known, .found = wanted});
-  }
-  return terms;
-}
-
 IdentifiedDrive identify(const py::object& items, const py::object& load, const py::object& drive,
                          const std::optional<std::vector<std::string>>& terms, bool has_spring,
                          const std::string& group_by, std::size_t starts, std::uint64_t seed,
@@ -86,7 +67,7 @@ IdentifiedDrive identify(const py::object& items, const py::object& load, const 
                           .has_standard_errors = has_standard_errors,
                           .has_nested_score = has_nested_score,
                           .seed = seed};
-  if (terms) options.terms = terms_named(*terms);
+  if (terms) options.terms = drive_terms_named(*terms, "terms", "'auto' or terms of ");
   if (has_spring) options.largest = DriveTerms().set();
   return interruptible([&](const Progress& progress) {
     options.progress = progress;

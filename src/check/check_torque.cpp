@@ -35,11 +35,12 @@ bool Checker::has_lost_sign(std::size_t r) {
   return true;
 }
 
-std::optional<Plateau> Checker::plateau_of(std::size_t r) const {
+/// Empty where the target is spoiled or has too few samples.
+std::optional<double> Checker::noise_of_target(std::size_t r) const {
   const Recording& recording = dataset_.records[r].recording;
   const Channel& target = recording.channel(dataset_.target);
   if (spoiled_[r] != 0 || new_samples(target).size() < kFewestSamples) return {};
-  return find_plateau(pairs_[r], usual_noise(noise_course(target, recording.sample_rate_Hz())));
+  return usual_noise(noise_course(target, recording.sample_rate_Hz()));
 }
 
 void Checker::report_plateau(std::size_t r, const Plateau& plateau) {
@@ -59,23 +60,22 @@ void Checker::report_plateau(std::size_t r, const Plateau& plateau) {
 // With two thirds of the target hidden, a model would be that of the sensor's limit.
 void Checker::check_hidden_torque() {
   for_each_record([&](std::size_t r) {
-    const auto plateau = plateau_of(r);
+    const auto noise = noise_of_target(r);
+    const auto plateau = noise ? find_plateau(pairs_[r], *noise) : std::nullopt;
     if (plateau && plateau->share >= kMaxOnPlateau) report_plateau(r, *plateau);
   });
 }
 
 // The converter after an amplifier adds noise, so that no two samples at its limit are equal.
 void Checker::check_limit(std::size_t r) {
-  const Recording& recording = dataset_.records[r].recording;
-  const Channel& target = recording.channel(dataset_.target);
-  if (spoiled_[r] != 0 || new_samples(target).size() < kFewestSamples) return;
-  if (const auto plateau = plateau_of(r)) return report_plateau(r, *plateau);
-  const auto limit =
-      find_limit(pairs_[r], usual_noise(noise_course(target, recording.sample_rate_Hz())));
+  const auto noise = noise_of_target(r);
+  if (!noise) return;
+  if (const auto plateau = find_plateau(pairs_[r], *noise)) return report_plateau(r, *plateau);
+  const auto limit = find_limit(pairs_[r], *noise);
   if (!limit) return;
   std::vector<SampleRange> places;
   for (const Rest& rest : limit->samples) places.push_back({rest.begin, rest.end});
-  add(Verdict::warn, "saturation", recording.name(),
+  add(Verdict::warn, "saturation", dataset_.records[r].recording.name(),
       fmt::format(
           "{0} stops {1} times at {2:.4g} {3}, within its noise, although {4} moves on: without a "
           "limit it would have changed by up to {5:.3g} {3} more",

@@ -119,7 +119,7 @@ class Checker {
   [[nodiscard]] bool has_lost_sign(std::size_t r);
   void check_limit(std::size_t r);
   void check_hidden_torque();
-  [[nodiscard]] std::optional<Plateau> plateau_of(std::size_t r) const;
+  [[nodiscard]] std::optional<double> noise_of_target(std::size_t r) const;
   void report_plateau(std::size_t r, const Plateau& plateau);
   void check_position();
   void check_zeros();

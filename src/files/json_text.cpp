@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <utility>
@@ -98,6 +99,10 @@ json parse_json(std::string_view text, std::string_view place, std::string_view 
   DocumentBuilder builder(place, advice);
   (void)json::sax_parse(text, &builder);
   return builder.take();
+}
+
+nlohmann::ordered_json json_number(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
 }
 
 }  // namespace torsio

@@ -13,4 +13,7 @@ namespace torsio {
     std::string_view text, std::string_view place,
     std::string_view advice = "The file is damaged: copy it again or fit the model again.");
 
+/// A number that is not finite is null.
+[[nodiscard]] nlohmann::ordered_json json_number(double value);
+
 }  // namespace torsio

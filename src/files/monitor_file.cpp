@@ -31,10 +31,6 @@ constexpr double kRateTolerance = 1e-3;
 constexpr std::string_view kMonitorAdvice =
     "The monitor file is damaged: calibrate the monitor again (torsio monitor --calibrate).";
 
-/// JSON has no infinity: a limit that is none is null.
-ordered_json limit(double value) {
-  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
-}
 double limit_of(const JsonObject& object, const char* key, double none) {
   const double value = object.number(key);
   return std::isnan(value) ? none : value;
@@ -50,13 +46,13 @@ std::string_view text_of(std::span<const std::byte> bytes) {
 
 ordered_json signal_json(const MonitoredSignal& signal) {
   return {{"signal", signal.name},
-          {"lowest", limit(signal.lowest)},
-          {"highest", limit(signal.highest)},
-          {"largest_rate", limit(signal.largest_rate)},
-          {"longest_age_s", limit(signal.longest_age_s)},
+          {"lowest", json_number(signal.lowest)},
+          {"highest", json_number(signal.highest)},
+          {"largest_rate", json_number(signal.largest_rate)},
+          {"longest_age_s", json_number(signal.longest_age_s)},
           {"turn", signal.turn},
           {"moves_with", signal.moves_with},
-          {"largest_hidden_travel", limit(signal.largest_hidden_travel)}};
+          {"largest_hidden_travel", json_number(signal.largest_hidden_travel)}};
 }
 
 MonitoredSignal signal_of(const JsonObject& object, const std::string& place) {
@@ -85,10 +81,10 @@ ordered_json pair_json(const PairLimits& pair, const std::vector<std::string>& s
           {"second", sources.at(pair.second)},
           {"factor", pair.factor},
           {"floor_Nm", pair.floor_Nm},
-          {"ceiling_Nm", limit(pair.ceiling_Nm)},
-          {"largest_armed_Nm", limit(pair.largest_armed_Nm)},
+          {"ceiling_Nm", json_number(pair.ceiling_Nm)},
+          {"largest_armed_Nm", json_number(pair.largest_armed_Nm)},
           {"drift_allowance", pair.drift_allowance},
-          {"drift_limit_s", limit(pair.drift_limit_s)}};
+          {"drift_limit_s", json_number(pair.drift_limit_s)}};
 }
 
 std::uint8_t source_index(const std::vector<std::string>& sources, const std::string& name,
@@ -180,7 +176,7 @@ ordered_json monitor_json(const MonitorFile& file) {
   document["valid_until"] = file.valid_until;
   document["sample_period_s"] = monitor.sample_period_s;
   document["fault_free_hours"] = file.fault_free_hours;
-  document["false_alarms_per_hour"] = limit(file.false_alarms_per_hour);
+  document["false_alarms_per_hour"] = json_number(file.false_alarms_per_hour);
   document["is_extrapolated"] = file.is_extrapolated;
   document["recordings"] = ordered_json::array();
   for (const Source& source : file.recordings)
@@ -200,15 +196,15 @@ ordered_json monitor_json(const MonitorFile& file) {
   document["actions"] = actions_json(monitor);
   document["persistence_s"] = monitor.persistence_s;
   document["release_share"] = monitor.release_share;
-  document["longest_loss_s"] = limit(monitor.longest_loss_s);
-  document["longest_fault_s"] = limit(monitor.longest_fault_s);
-  document["longest_warm_up_s"] = limit(monitor.longest_warm_up_s);
-  document["largest_novelty"] = limit(monitor.largest_novelty);
+  document["longest_loss_s"] = json_number(monitor.longest_loss_s);
+  document["longest_fault_s"] = json_number(monitor.longest_fault_s);
+  document["longest_warm_up_s"] = json_number(monitor.longest_warm_up_s);
+  document["largest_novelty"] = json_number(monitor.largest_novelty);
   document["longest_overrun"] = monitor.longest_overrun;
   document["spikes_in_a_row"] = monitor.spikes_in_a_row;
-  document["spike_memory_s"] = limit(monitor.spike_memory_s);
+  document["spike_memory_s"] = json_number(monitor.spike_memory_s);
   document["proof_s"] = monitor.proof_s;
-  document["longest_command_age_s"] = limit(monitor.longest_command_age_s);
+  document["longest_command_age_s"] = json_number(monitor.longest_command_age_s);
   return document;
 }
 

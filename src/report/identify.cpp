@@ -14,10 +14,6 @@ namespace {
 
 using DriveJson = nlohmann::ordered_json;
 
-const DriveParameterInfo& info_of(const IdentifiedDriveParameter& parameter) {
-  return drive_parameters()[static_cast<std::size_t>(parameter.parameter)];
-}
-
 std::string number_or_dash(double value) {
   return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-";
 }
@@ -42,7 +38,7 @@ TextTable drive_parameter_table(const DriveIdentification& identified) {
   TextTable table;
   table.header({"parameter", "value", "standard error", "95 % interval", "what it is"});
   for (const IdentifiedDriveParameter& parameter : identified.parameters) {
-    const DriveParameterInfo& info = info_of(parameter);
+    const DriveParameterInfo& info = drive_parameter_info(parameter.parameter);
     std::string note(info.meaning);
     if (parameter.is_at_bound) note += " (at its bound)";
     if (!parameter.is_determined) note += " (not determined)";
@@ -116,8 +112,7 @@ TextTable drive_advice_table(const std::vector<DriveAdvice>& advice) {
   TextTable table;
   table.header({"next recording", "lowers the standard error of", "to"});
   for (const DriveAdvice& row : advice)
-    table.row({row.recording,
-               std::string(drive_parameters()[static_cast<std::size_t>(row.parameter)].name),
+    table.row({row.recording, std::string(drive_parameter_info(row.parameter).name),
                fmt::format("{:.0f} %", 100.0 * row.standard_error_ratio)});
   return table;
 }
@@ -130,7 +125,7 @@ DriveJson drive_advice_json(const std::vector<DriveAdvice>& advice) {
   DriveJson list = DriveJson::array();
   for (const DriveAdvice& row : advice)
     list.push_back({{"recording", row.recording},
-                    {"parameter", drive_parameters()[static_cast<std::size_t>(row.parameter)].name},
+                    {"parameter", drive_parameter_info(row.parameter).name},
                     {"standard_error_ratio", row.standard_error_ratio}});
   return list;
 }

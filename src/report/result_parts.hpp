@@ -6,14 +6,13 @@
 #include <vector>
 
 #include "evaluate/model_label.hpp"
+#include "files/json_text.hpp"
 #include "torsio/evaluate/results.hpp"
 #include "torsio/report/text_table.hpp"
 
 // Parts of the tables and documents of scores.
 namespace torsio {
 
-/// A number that is not finite is null.
-[[nodiscard]] nlohmann::ordered_json json_number(double value);
 [[nodiscard]] nlohmann::ordered_json text_or_null(const std::string& text);
 /// `results_json` before it becomes text.
 [[nodiscard]] nlohmann::ordered_json results_document(const Results& results);

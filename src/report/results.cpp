@@ -110,8 +110,6 @@ double rmse_on(const Results& results, const ResultRow& model, const std::string
 
 }  // namespace
 
-Json json_number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 std::string error_text(double value, double smallest) {

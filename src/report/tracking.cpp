@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/running_mean.hpp"
+#include "files/json_text.hpp"
 #include "report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
@@ -206,9 +207,6 @@ std::string drive_text(std::span<const TrackingRow> rows) {
 
 Json drive_json(const TrackingRow& row) {
   if (!row.limits || !row.drive) return nullptr;
-  const auto bound = [](double value) {
-    return std::isfinite(value) ? Json(value) : Json(nullptr);
-  };
   return {{"lowest_rad", row.drive->lowest_rad},
           {"highest_rad", row.drive->highest_rad},
           {"fastest_rad_s", row.drive->fastest_rad_s},
@@ -216,9 +214,9 @@ Json drive_json(const TrackingRow& row) {
           {"allowed_spring_Nm", row.drive->allowed_spring_Nm},
           {"limited_s", row.drive->limited_s},
           {"limits",
-           {{"lowest_rad", bound(row.limits->lowest_rad)},
-            {"highest_rad", bound(row.limits->highest_rad)},
-            {"speed_rad_s", bound(row.limits->speed_rad_s)}}},
+           {{"lowest_rad", json_number(row.limits->lowest_rad)},
+            {"highest_rad", json_number(row.limits->highest_rad)},
+            {"speed_rad_s", json_number(row.limits->speed_rad_s)}}},
           {"kept", are_kept(*row.limits, *row.drive)}};
 }
 

@@ -12,7 +12,6 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
-#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/identify/drive/drive_file.hpp"
@@ -45,30 +44,6 @@ struct DriveIdentifyFlags {
   ReportOutput report;
 };
 
-torsio::DriveTerms terms_of(const std::string& text) {
-  std::string known;
-  torsio::DriveTerms terms = torsio::drive_terms({torsio::DriveTerm::base});
-  for (const std::string& wanted : torsio::split_inputs(text)) {
-    bool is_known = false;
-    known.clear();
-    std::vector<std::string_view> names;
-    for (std::size_t k = 0; k < torsio::kDriveTerms; ++k) {
-      const std::string_view term = torsio::name(static_cast<torsio::DriveTerm>(k));
-      names.push_back(term);
-      known += (known.empty() ? "" : ", ") + std::string(term);
-      if (term != wanted) continue;
-      terms.set(k);
-      is_known = true;
-    }
-    if (!is_known)
-      throw torsio::UsageError({.place = "--terms",
-                                .expected = "auto, or terms of " + known,
-                                .found = wanted,
-                                .advice = torsio::did_you_mean(wanted, names)});
-  }
-  return terms;
-}
-
 torsio::DriveTerms all_terms() { return torsio::DriveTerms().set(); }
 
 torsio::IdentifyOptions options_of(const DriveIdentifyFlags& flags,
@@ -89,7 +64,8 @@ torsio::IdentifyOptions options_of(const DriveIdentifyFlags& flags,
           {.place = "--step", .expected = "a time from 0.01ms to 100ms", .found = flags.step});
   }
   if (flags.terms != "auto")
-    options.terms = terms_of(flags.terms);
+    options.terms = torsio::drive_terms_named(torsio::split_inputs(flags.terms), "--terms",
+                                              "auto, or terms of ");
   else if (flags.has_spring)
     options.largest = all_terms();
   return options;

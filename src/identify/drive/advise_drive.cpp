@@ -91,10 +91,7 @@ Eigen::MatrixXd matrix_of(const DriveLogs& logs, const DriveIdentification& iden
 
 std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
                                       const std::vector<Recording>& recordings) {
-  std::vector<DriveLog> logs;
-  logs.reserve(recordings.size());
-  for (const Recording& recording : recordings)
-    logs.push_back(drive_log(recording, identified.load, identified.drive));
+  const std::vector<DriveLog> logs = drive_logs(recordings, identified.load, identified.drive);
   const DriveLogs all = pointers_to(logs);
   const DriveFitOptions options{.step_s = identified.step_s};
   Eigen::MatrixXd before = matrix_of(all, identified, options);

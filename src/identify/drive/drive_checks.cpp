@@ -17,10 +17,6 @@
 namespace torsio {
 namespace {
 
-bool has_winding(const DriveLog& log) {
-  return log.kind == CommandKind::goal_to_duty || log.kind == CommandKind::duty;
-}
-
 bool is_on(const DriveLog& log, std::size_t n) {
   return log.enabled.empty() || log.enabled[n] != 0.0;
 }
@@ -191,7 +187,7 @@ void check_command(const std::vector<DriveLog>& logs, const std::vector<Course>&
 
 void check_passive(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
                    Findings& findings) {
-  if (!has_winding(logs.front())) return;
+  if (!has_winding(logs.front().kind)) return;
   if (std::ranges::none_of(courses, [](const Course& course) { return course.has_passive_motion; }))
     findings.warn(
         "passive run",
@@ -270,7 +266,7 @@ void check_temperature(const std::vector<Recording>& recordings, const std::vect
 /// Share of the supply that the back-EMF of the fitted motor takes.
 void check_speeds(const std::vector<DriveLog>& logs, const DriveIdentification& identified,
                   Findings& findings) {
-  if (!has_winding(logs.front())) return;
+  if (!has_winding(logs.front().kind)) return;
   double speed = 0.0;
   for (const DriveLog& log : logs) speed = std::max(speed, course_of(log).largest_speed_rad_s);
   const double share =
@@ -373,8 +369,7 @@ std::vector<DriveFinding> check_identified(const std::vector<DriveLog>& logs,
                                            const DriveIdentification& identified) {
   Findings findings;
   for (const IdentifiedDriveParameter& parameter : identified.parameters) {
-    const DriveParameterInfo& info =
-        drive_parameters()[static_cast<std::size_t>(parameter.parameter)];
+    const DriveParameterInfo& info = drive_parameter_info(parameter.parameter);
     if (parameter.is_at_bound)
       findings.warn(
           "bound",

@@ -26,14 +26,6 @@ constexpr std::string_view kDriveFileAdvice =
 constexpr std::size_t kMaxDriveFileBytes = 16U << 20U;
 constexpr double kLongestStep_s = 0.1;
 
-DriveFileJson number_or_null(double value) {
-  return std::isfinite(value) ? DriveFileJson(value) : DriveFileJson(nullptr);
-}
-
-const DriveParameterInfo& info_of_row(DriveParameter parameter) {
-  return drive_parameters()[static_cast<std::size_t>(parameter)];
-}
-
 DriveFileJson values_json(const DriveValues& values) {
   DriveFileJson document = DriveFileJson::object();
   for (const DriveParameterInfo& info : drive_parameters())
@@ -44,12 +36,12 @@ DriveFileJson values_json(const DriveValues& values) {
 DriveFileJson parameters_json(const DriveIdentification& identified) {
   DriveFileJson list = DriveFileJson::array();
   for (const IdentifiedDriveParameter& parameter : identified.parameters)
-    list.push_back({{"name", info_of_row(parameter.parameter).name},
-                    {"value", number_or_null(parameter.value)},
-                    {"standard_error", number_or_null(parameter.standard_error)},
-                    {"lowest_95", number_or_null(parameter.lowest)},
-                    {"highest_95", number_or_null(parameter.highest)},
-                    {"standard_error_from_load", number_or_null(parameter.from_load)},
+    list.push_back({{"name", drive_parameter_info(parameter.parameter).name},
+                    {"value", json_number(parameter.value)},
+                    {"standard_error", json_number(parameter.standard_error)},
+                    {"lowest_95", json_number(parameter.lowest)},
+                    {"highest_95", json_number(parameter.highest)},
+                    {"standard_error_from_load", json_number(parameter.from_load)},
                     {"is_determined", parameter.is_determined},
                     {"is_at_bound", parameter.is_at_bound}});
   return list;
@@ -60,9 +52,9 @@ DriveFileJson scores_json(const DriveIdentification& identified) {
   for (const DriveRecordingScore& score : identified.recordings)
     list.push_back({{"recording", score.recording},
                     {"group", score.group},
-                    {"mae_rad", number_or_null(score.mae_rad)},
-                    {"held_out_mae_rad", number_or_null(score.held_out_mae_rad)},
-                    {"nested_mae_rad", number_or_null(score.nested_mae_rad)}});
+                    {"mae_rad", json_number(score.mae_rad)},
+                    {"held_out_mae_rad", json_number(score.held_out_mae_rad)},
+                    {"nested_mae_rad", json_number(score.nested_mae_rad)}});
   return list;
 }
 
@@ -71,8 +63,8 @@ DriveFileJson structures_json(const DriveIdentification& identified) {
   for (const StructureTrial& trial : identified.trials)
     list.push_back({{"terms", terms_text(trial.terms)},
                     {"change", trial.change},
-                    {"held_out_mae_rad", number_or_null(trial.mae_rad)},
-                    {"difference_standard_error_rad", number_or_null(trial.gain_error_rad)},
+                    {"held_out_mae_rad", json_number(trial.mae_rad)},
+                    {"difference_standard_error_rad", json_number(trial.gain_error_rad)},
                     {"is_taken", trial.is_taken}});
   return list;
 }
@@ -128,7 +120,7 @@ DriveValues values_from(const JsonObject& document, const DriveTerms& terms,
   for (const auto& [text, value] : document.number_map("values")) {
     const std::string at_value = fmt::format("{}/values/{}", place, text);
     const DriveParameter parameter = parameter_from(text, at_value);
-    const DriveParameterInfo& info = info_of_row(parameter);
+    const DriveParameterInfo& info = drive_parameter_info(parameter);
     const bool is_searched = has(terms, info.term) && info.is_positive && value != info.neutral;
     if (!std::isfinite(value) || (info.is_positive && value < 0.0) ||
         (is_searched && !(value > 0.0)))
@@ -212,10 +204,10 @@ DriveFileJson drive_document(const DriveIdentification& identified) {
                          {"law", name(identified.drive.law)},
                          {"terms", terms_text(identified.terms)},
                          {"step_s", identified.step_s},
-                         {"mae_rad", number_or_null(identified.mae_rad)},
-                         {"rmse_rad", number_or_null(identified.rmse_rad)},
-                         {"held_out_mae_rad", number_or_null(identified.held_out_mae_rad)},
-                         {"nested_mae_rad", number_or_null(identified.nested_mae_rad)},
+                         {"mae_rad", json_number(identified.mae_rad)},
+                         {"rmse_rad", json_number(identified.rmse_rad)},
+                         {"held_out_mae_rad", json_number(identified.held_out_mae_rad)},
+                         {"nested_mae_rad", json_number(identified.nested_mae_rad)},
                          {"groups", identified.groups},
                          {"parameters", parameters_json(identified)},
                          {"recordings", scores_json(identified)},

@@ -23,10 +23,6 @@ double prior_share(const DriveProblem& problem) {
   return is_elastic ? kElastic : kRigid;
 }
 
-bool has_winding(CommandKind kind) {
-  return kind == CommandKind::goal_to_duty || kind == CommandKind::duty;
-}
-
 bool is_searched(const DriveParameterInfo& info, const DriveTerms& terms, CommandKind kind) {
   if (!has(terms, info.term)) return false;
   if (info.parameter == DriveParameter::torque_constant)
@@ -210,9 +206,10 @@ DriveLogs always_powered(const DriveLogs& logs) {
   return powered;
 }
 
-DriveSolution search_springs(const DriveProblem& problem, const DriveLogs& logs,
-                             const DriveTerms& terms, const DriveValues& typical,
+DriveSolution search_springs(const DriveLogs& logs, const DriveTerms& terms,
                              const DriveFitOptions& options) {
+  const DriveProblem problem = drive_problem(logs, terms, options);
+  const DriveValues typical = typical_values(logs, terms);
   const DriveTerms one = terms & possible_terms(logs.front()->kind, false, false);
   DriveFitOptions quick = options;
   quick.starts = 1;
@@ -260,14 +257,10 @@ DriveSolution fit_two_masses(const DriveLogs& logs, const DriveTerms& terms,
   const DriveProblem problem = drive_problem(logs, terms, options);
   const DriveLogs powered = always_powered(logs);
   constexpr std::size_t kFewestPowered = 2;
-  const bool has_falls = powered.size() < logs.size();
-  if (!has_falls || powered.size() < kFewestPowered)
-    return reweighted(
-        problem, search_springs(problem, logs, terms, typical_values(logs, terms), options).values,
-        options);
-  const DriveSolution start = search_springs(drive_problem(powered, terms, options), powered, terms,
-                                             typical_values(powered, terms), options);
-  return reweighted(problem, reweighted(problem, start.values, options).values, options);
+  const bool begins_powered = powered.size() < logs.size() && powered.size() >= kFewestPowered;
+  DriveValues values = search_springs(begins_powered ? powered : logs, terms, options).values;
+  if (begins_powered) values = reweighted(problem, values, options).values;
+  return reweighted(problem, values, options);
 }
 
 }  // namespace

@@ -18,6 +18,11 @@ enum class CommandKind : std::uint8_t {
   torque,   ///< [Nm]
 };
 
+/// Whether the command is the voltage of a winding, whose resistance and back-EMF are in the equations.
+[[nodiscard]] constexpr bool has_winding(CommandKind kind) {
+  return kind == CommandKind::goal_to_duty || kind == CommandKind::duty;
+}
+
 /// One recording as the free runs need it; the angle is that of the motor after the gear, or of the joint.
 struct DriveLog {
   std::string name;

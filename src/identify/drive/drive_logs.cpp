@@ -124,6 +124,16 @@ std::vector<double> ends_of_commands(const std::vector<double>& command) {
   return ends;
 }
 
+/// The angle that the free runs are compared with, after the gear.
+std::vector<double> angle_after_gear(const Recording& recording, const DriveSheet& drive) {
+  const std::string name = angle_channel(recording, drive);
+  std::vector<double> angle_rad = finite_channel(recording, name);
+  if (name != "motor_angle_rad") return angle_rad;
+  const double ratio = gear_ratio(recording, drive);
+  for (double& value : angle_rad) value /= ratio;
+  return angle_rad;
+}
+
 }  // namespace
 
 std::string angle_channel(const Recording& recording, const DriveSheet& drive) {
@@ -148,17 +158,20 @@ DriveLog drive_log(const Recording& recording, const LoadSheet& load, const Driv
     throw Error({.place = recording.name(),
                  .expected = fmt::format("at least {} samples", kFewestSamples),
                  .found = fmt::format("{}", recording.size())});
-  const std::string angle = angle_channel(recording, drive);
-  log.angle_rad = finite_channel(recording, angle);
-  if (angle == "motor_angle_rad") {
-    const double ratio = gear_ratio(recording, drive);
-    for (double& value : log.angle_rad) value /= ratio;
-  }
+  log.angle_rad = angle_after_gear(recording, drive);
   set_law(recording, drive, log);
   log.command_end = ends_of_commands(log.command);
   if (recording.has("enabled_1")) log.enabled = finite_channel(recording, "enabled_1");
   log.load = known_load(load, recording);
   return log;
+}
+
+std::vector<DriveLog> drive_logs(const std::vector<Recording>& recordings, const LoadSheet& load,
+                                 const DriveSheet& drive) {
+  std::vector<DriveLog> logs;
+  logs.reserve(recordings.size());
+  for (const Recording& recording : recordings) logs.push_back(drive_log(recording, load, drive));
+  return logs;
 }
 
 MeasuredDrive measured_drive(const std::vector<Recording>& recordings, const DriveSheet& sheet) {
@@ -172,12 +185,7 @@ MeasuredDrive measured_drive(const std::vector<Recording>& recordings, const Dri
     if (!recording.has("duty_1")) continue;
     const std::vector<double>& duty = finite_channel(recording, "duty_1");
     const std::vector<double>& goal = finite_channel(recording, command_channel(recording, sheet));
-    const std::string angle_name = angle_channel(recording, sheet);
-    std::vector<double> angle = finite_channel(recording, angle_name);
-    if (angle_name == "motor_angle_rad") {
-      const double ratio = gear_ratio(recording, sheet);
-      for (double& value : angle) value /= ratio;
-    }
+    const std::vector<double> angle = angle_after_gear(recording, sheet);
     const double gain = fact_in(sheet.gain, recording, sheet.file, "gain");
     const std::vector<double> slow = slow_samples(goal, angle);
     for (std::size_t n = 0; n < duty.size(); ++n) {

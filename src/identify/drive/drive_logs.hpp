@@ -23,6 +23,10 @@ struct MeasuredDrive {
 [[nodiscard]] DriveLog drive_log(const Recording& recording, const LoadSheet& load,
                                  const DriveSheet& drive);
 
+/// One for each recording, without groups.
+[[nodiscard]] std::vector<DriveLog> drive_logs(const std::vector<Recording>& recordings,
+                                               const LoadSheet& load, const DriveSheet& drive);
+
 /// Name of the channel that the free runs are compared with.
 [[nodiscard]] std::string angle_channel(const Recording& recording, const DriveSheet& drive);
 

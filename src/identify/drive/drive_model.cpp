@@ -1,5 +1,11 @@
 #include "torsio/identify/drive/drive_model.hpp"
 
+#include <algorithm>
+
+#include "core/did_you_mean.hpp"
+#include "data/names.hpp"
+#include "torsio/core/error.hpp"
+
 namespace torsio {
 namespace {
 
@@ -54,6 +60,13 @@ constexpr std::array<DriveParameterInfo, kDriveParameters> kParameters{{
      1e-6, 0.05, true},
 }};
 
+// A parameter is the number of its row.
+static_assert([] {
+  for (std::size_t row = 0; row < kDriveParameters; ++row)
+    if (kParameters[row].parameter != static_cast<DriveParameter>(row)) return false;
+  return true;
+}());
+
 constexpr std::array<std::string_view, kDriveTerms> kTermNames{
     "base",          "delay",       "load_friction", "load_stribeck", "stribeck", "resistance_rise",
     "duty_exponent", "speed_limit", "direction",     "joint_inertia", "spring",   "hysteresis",
@@ -69,7 +82,27 @@ DriveTerms drive_terms(std::initializer_list<DriveTerm> terms) {
   return set;
 }
 
+DriveTerms drive_terms_named(std::span<const std::string> names, const std::string& place,
+                             const std::string& expected) {
+  DriveTerms terms = drive_terms({DriveTerm::base});
+  for (const std::string& wanted : names) {
+    const auto* const found = std::ranges::find(kTermNames, wanted);
+    if (found == kTermNames.end())
+      throw UsageError({.place = place,
+                        .expected = expected + joined(std::vector<std::string>(kTermNames.begin(),
+                                                                               kTermNames.end())),
+                        .found = wanted,
+                        .advice = did_you_mean(wanted, kTermNames)});
+    terms.set(static_cast<std::size_t>(found - kTermNames.begin()));
+  }
+  return terms;
+}
+
 std::span<const DriveParameterInfo, kDriveParameters> drive_parameters() { return kParameters; }
+
+const DriveParameterInfo& drive_parameter_info(DriveParameter parameter) {
+  return kParameters[static_cast<std::size_t>(parameter)];
+}
 
 DriveValues neutral_drive_values() {
   DriveValues values{};

@@ -11,10 +11,7 @@ DriveIdentification evaluate_drive(const DriveIdentification& identified,
   if (recordings.empty())
     throw UsageError({.place = "evaluate_drive", .expected = "recordings", .found = "none"});
   const std::vector<std::string> groups = drive_groups(recordings, group_by);
-  std::vector<DriveLog> logs;
-  logs.reserve(recordings.size());
-  for (const Recording& recording : recordings)
-    logs.push_back(drive_log(recording, identified.load, identified.drive));
+  const std::vector<DriveLog> logs = drive_logs(recordings, identified.load, identified.drive);
   const DriveFitOptions options{.step_s = identified.step_s};
   const DriveScore score =
       score_drive(drive_problem(pointers_to(logs), identified.terms, options), identified.values);

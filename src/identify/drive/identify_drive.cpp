@@ -22,12 +22,8 @@ namespace {
 std::vector<DriveLog> logs_of(const std::vector<Recording>& recordings, const LoadSheet& load,
                               const DriveSheet& drive, const std::string& group_by) {
   const std::vector<std::string> groups = drive_groups(recordings, group_by);
-  std::vector<DriveLog> logs;
-  logs.reserve(recordings.size());
-  for (std::size_t k = 0; k < recordings.size(); ++k) {
-    logs.push_back(drive_log(recordings[k], load, drive));
-    logs.back().group = groups[k];
-  }
+  std::vector<DriveLog> logs = drive_logs(recordings, load, drive);
+  for (std::size_t k = 0; k < logs.size(); ++k) logs[k].group = groups[k];
   return logs;
 }
 

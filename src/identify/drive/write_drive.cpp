@@ -22,12 +22,8 @@ constexpr std::array<std::string_view, 3> kTargetNames{"bam", "mjcf", "isaaclab"
 
 std::vector<DriveLog> grouped_logs(const DriveIdentification& identified,
                                    const std::vector<Recording>& recordings) {
-  std::vector<DriveLog> logs;
-  logs.reserve(recordings.size());
-  for (std::size_t k = 0; k < recordings.size(); ++k) {
-    logs.push_back(drive_log(recordings[k], identified.load, identified.drive));
-    logs.back().group = identified.recordings[k].group;
-  }
+  std::vector<DriveLog> logs = drive_logs(recordings, identified.load, identified.drive);
+  for (std::size_t k = 0; k < logs.size(); ++k) logs[k].group = identified.recordings[k].group;
   return logs;
 }
 

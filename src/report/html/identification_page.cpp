@@ -103,10 +103,6 @@ XyFigure errors_figure(const DriveIdentification& identified) {
   return figure;
 }
 
-const DriveParameterInfo& row_of(const IdentifiedDriveParameter& parameter) {
-  return drive_parameters()[static_cast<std::size_t>(parameter.parameter)];
-}
-
 /// 95 % intervals as horizontal lines, one above the other: over the value where the parameter is positive, else over the
 /// standard error.
 XyFigure intervals_figure(const DriveIdentification& identified, bool of_positive) {
@@ -121,13 +117,15 @@ XyFigure intervals_figure(const DriveIdentification& identified, bool of_positiv
   XySeries others{.label = "not determined", .role = CurveRole::limit, .x = {}, .y = {}};
   for (std::size_t k = 0; k < identified.parameters.size(); ++k) {
     const IdentifiedDriveParameter& parameter = identified.parameters[k];
-    if (row_of(parameter).is_positive != of_positive || !std::isfinite(parameter.lowest)) continue;
+    if (drive_parameter_info(parameter.parameter).is_positive != of_positive ||
+        !std::isfinite(parameter.lowest))
+      continue;
     const double unit = of_positive ? parameter.value : parameter.standard_error;
     if (!(unit > 0.0)) continue;
     const auto row = static_cast<double>(k + 1);
     values.x.push_back(parameter.value / unit);
     values.y.push_back(row);
-    values.names.emplace_back(row_of(parameter).name);
+    values.names.emplace_back(drive_parameter_info(parameter.parameter).name);
     XySeries& intervals = parameter.is_determined ? determined : others;
     intervals.x.insert(intervals.x.end(),
                        {parameter.lowest / unit, parameter.highest / unit, kNotMeasured});
@@ -237,7 +235,8 @@ std::vector<std::string> summary_of(const DriveIdentification& identified) {
   std::string missing;
   for (const IdentifiedDriveParameter& parameter : identified.parameters)
     if (!parameter.is_determined)
-      missing += fmt::format("{}{}", missing.empty() ? "" : ", ", row_of(parameter).name);
+      missing += fmt::format("{}{}", missing.empty() ? "" : ", ",
+                             drive_parameter_info(parameter.parameter).name);
   if (!missing.empty()) summary.push_back("Not determined: " + missing + ".");
   return summary;
 }

@@ -105,8 +105,7 @@ TEST(IdentifyDrive, TakesAPayloadOnAJointOfAUrdfAsThePendulumThatItIs) {
   const DriveIdentification by_urdf = identify_drive(recordings, urdf, drive, options);
   const DriveIdentification by_pendulum = identify_drive(recordings, pendulum(), drive, options);
   for (const IdentifiedDriveParameter& parameter : by_pendulum.parameters) {
-    const DriveParameterInfo& info =
-        drive_parameters()[static_cast<std::size_t>(parameter.parameter)];
+    const DriveParameterInfo& info = drive_parameter_info(parameter.parameter);
     if (!info.is_positive) continue;
     EXPECT_NEAR(value_of(by_urdf, parameter.parameter), parameter.value, 0.01 * parameter.value)
         << info.name;

@@ -4,7 +4,9 @@
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace torsio {
@@ -87,6 +89,12 @@ using DriveTerms = std::bitset<kDriveTerms>;
 
 [[nodiscard]] std::string_view name(DriveTerm term);
 [[nodiscard]] DriveTerms drive_terms(std::initializer_list<DriveTerm> terms);
+/// The base and the terms of these names.
+/// @param place for messages: "--terms"
+/// @param expected what they are, before the known names: "auto, or terms of "
+/// @throws UsageError for an unknown name, with the nearest one.
+[[nodiscard]] DriveTerms drive_terms_named(std::span<const std::string> names,
+                                           const std::string& place, const std::string& expected);
 [[nodiscard]] inline bool has(const DriveTerms& terms, DriveTerm term) {
   return terms.test(static_cast<std::size_t>(term));
 }
@@ -104,6 +112,7 @@ struct DriveParameterInfo {
 };
 
 [[nodiscard]] std::span<const DriveParameterInfo, kDriveParameters> drive_parameters();
+[[nodiscard]] const DriveParameterInfo& drive_parameter_info(DriveParameter parameter);
 
 using DriveValues = std::array<double, kDriveParameters>;
 
