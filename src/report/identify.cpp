@@ -94,9 +94,10 @@ std::string identification_text(const DriveIdentification& identified) {
   text += structure_text(identified);
   if (identified.error_gain)
     text += fmt::format(
-        "error_gain measured from the duty: {:.5g} for 1 rad at gain 1, residual {:.2g} (RMS of "
-        "the duty)\n",
-        identified.error_gain->value_1_rad, identified.error_gain->residual_duty_1);
+        "error_gain measured from the duty: {:.5g} for 1 rad at gain 1, {:.0f} ms after the goal, "
+        "residual {:.2g} (RMS of the duty)\n",
+        identified.error_gain->value_1_rad, 1e3 * identified.error_gain->delay_s,
+        identified.error_gain->residual_duty_1);
   if (!identified.parameters.empty() && std::isfinite(identified.parameters.front().standard_error))
     text += fmt::format(
         "standard errors: from fits without one recording each ({} recordings, Student's t), and "

@@ -36,7 +36,8 @@ void score(const GroupedLogs& logs, HeldOutStructure& structure, const DriveFitO
   structure.mae_of_log_rad.assign(logs.logs.size(), 0.0);
   for (std::size_t k = 0; k < logs.logs.size(); ++k) {
     const DriveProblem one = drive_problem({logs.logs[k]}, structure.terms, options);
-    structure.mae_of_log_rad[k] = score_drive(one, structure.fits[logs.group[k]].values).mae_rad;
+    const double mae_rad = score_drive(one, structure.fits[logs.group[k]].values).mae_rad;
+    structure.mae_of_log_rad[k] = std::isfinite(mae_rad) ? mae_rad : HUGE_VAL;
   }
   structure.mae_rad =
       std::reduce(structure.mae_of_log_rad.begin(), structure.mae_of_log_rad.end()) /
@@ -73,6 +74,25 @@ std::vector<DriveTerm> cheapest(const GroupedLogs& logs, const HeldOutStructure&
   return best;
 }
 
+/// The structures without one of the candidates each, refitted without each group from the fits that they come from.
+std::vector<HeldOutStructure> trials_without(const GroupedLogs& logs, const HeldOutStructure& now,
+                                             const std::vector<DriveTerm>& candidates,
+                                             const DriveFitOptions& options, std::size_t threads) {
+  std::vector<HeldOutStructure> trials(candidates.size());
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    trials[c].terms = without_term(now.terms, candidates[c]);
+    trials[c].fits.resize(logs.groups);
+  }
+  for_each_chunk(candidates.size() * logs.groups, threads, [&](std::size_t k) {
+    const std::size_t c = k / logs.groups;
+    const std::size_t group = k % logs.groups;
+    trials[c].fits[group] =
+        refit_drive(logs.without(group), trials[c].terms, now.fits[group].values, options);
+  });
+  for (HeldOutStructure& trial : trials) score(logs, trial, options);
+  return trials;
+}
+
 double loss_of_training(const HeldOutStructure& structure) {
   double sum = 0.0;
   for (const DriveSolution& fit : structure.fits) sum += fit.cost;
@@ -81,6 +101,7 @@ double loss_of_training(const HeldOutStructure& structure) {
 
 bool is_better_without(const HeldOutStructure& without, const HeldOutStructure& with, double least,
                        double scatter) {
+  if (!std::isfinite(with.mae_rad)) return std::isfinite(without.mae_rad);
   const bool is_beyond_scatter = with.mae_rad - without.mae_rad >= scatter;
   if (is_beyond_scatter && without.mae_rad <= (1.0 - kLeastFall) * least) return true;
   const bool is_idle = loss_of_training(without) <= kIdle * loss_of_training(with);
@@ -134,22 +155,7 @@ ChosenStructure choose_structure(const GroupedLogs& logs, const DriveTerms& larg
   while (!removable(chosen.held_out.terms).empty()) {
     const HeldOutStructure& now = chosen.held_out;
     const std::vector<DriveTerm> candidates = cheapest(logs, now, options, threads);
-    std::vector<HeldOutStructure> trials(candidates.size());
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
-      trials[c].terms = without_term(now.terms, candidates[c]);
-      trials[c].fits.resize(logs.groups);
-    }
-    for_each_chunk(candidates.size() * logs.groups, threads, [&](std::size_t k) {
-      const std::size_t c = k / logs.groups;
-      const std::size_t group = k % logs.groups;
-      trials[c].fits[group] =
-          refit_drive(logs.without(group), trials[c].terms, now.fits[group].values, options);
-    });
-    std::size_t best = 0;
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
-      score(logs, trials[c], options);
-      if (trials[c].mae_rad < trials[best].mae_rad) best = c;
-    }
+    std::vector<HeldOutStructure> trials = trials_without(logs, now, candidates, options, threads);
     const std::size_t first = chosen.trials.size();
     for (std::size_t c = 0; c < candidates.size(); ++c)
       chosen.trials.push_back(
@@ -157,6 +163,8 @@ ChosenStructure choose_structure(const GroupedLogs& logs, const DriveTerms& larg
            .change = "without " + std::string(name(candidates[c])),
            .mae_rad = trials[c].mae_rad,
            .gain_error_rad = standard_error(trials[c].mae_of_log_rad, now.mae_of_log_rad)});
+    const auto best = static_cast<std::size_t>(
+        std::ranges::min_element(trials, {}, &HeldOutStructure::mae_rad) - trials.begin());
     const double scatter = chosen.trials[first + best].gain_error_rad;
     if (!is_better_without(trials[best], now, least, scatter)) break;
     chosen.trials[first + best].is_taken = true;

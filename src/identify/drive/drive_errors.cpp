@@ -46,37 +46,79 @@ std::vector<double> jackknife(const DriveProblem& problem, const std::vector<Dri
   return variances;
 }
 
-/// The same from the errors of the load, each a fit with the load one standard error off.
+// A search ends before it follows a change of a few parts in a thousand: the fit is that of an error of this share, whose
+// effect is divided by the enlargement.
+constexpr double kEnlargedTo = 0.05;
+constexpr double kMaxEnlargement = 100.0;
+
+double enlargement(double share) {
+  return share > 0.0 ? std::clamp(kEnlargedTo / share, 1.0, kMaxEnlargement) : 1.0;
+}
+
+/// The largest of the changes by an error of the load, of gravity and inertia as shares, of the zero in rad.
+double share_of_load(const std::vector<DriveLog>& logs, std::size_t error) {
+  double share = 0.0;
+  for (const DriveLog& log : logs) {
+    if (error >= log.load.errors.size()) continue;
+    const JointLoad& change = log.load.errors[error].change;
+    if (log.load.load.gravity_Nm > 0.0)
+      share = std::max(share, std::abs(change.gravity_Nm) / log.load.load.gravity_Nm);
+    if (log.load.load.inertia_kg_m2 > 0.0)
+      share = std::max(share, std::abs(change.inertia_kg_m2) / log.load.load.inertia_kg_m2);
+    share = std::max(share, std::abs(change.zero_rad));
+  }
+  return share;
+}
+
+/// Squared changes of the searched parameters, in the scale of the search, by one standard error of something that the
+/// logs state.
+/// @param factor by which `changed` has that error enlarged
+std::vector<double> squared_changes(const DriveProblem& problem,
+                                    const std::vector<DriveLog>& changed, double factor,
+                                    const DriveTerms& terms, const DriveValues& values,
+                                    const DriveFitOptions& options) {
+  const DriveValues fit = refit_drive(pointers_to(changed), terms, values, options).values;
+  std::vector<double> squares;
+  for (const SearchedDriveParameter& parameter : problem.searched) {
+    const double away =
+        in_search(parameter, fit[parameter.index]) - in_search(parameter, values[parameter.index]);
+    squares.push_back(away * away / (factor * factor));
+  }
+  return squares;
+}
+
+/// The same as `jackknife` from the errors of the load, each a fit with the load one standard error off.
 std::vector<double> from_load(const DriveProblem& problem, const std::vector<DriveLog>& logs,
                               const DriveTerms& terms, const DriveValues& values,
                               const DriveFitOptions& options, std::size_t threads) {
   const std::size_t errors = logs.front().load.errors.size();
-  std::vector<DriveValues> moved(errors);
+  std::vector<std::vector<double>> squares(errors);
   for_each_chunk(errors, threads, [&](std::size_t e) {
+    const double factor = enlargement(share_of_load(logs, e));
     std::vector<DriveLog> changed = logs;
-    DriveLogs all;
     for (DriveLog& log : changed) {
-      if (e < log.load.errors.size()) {
-        const JointLoad& change = log.load.errors[e].change;
-        log.load.load.gravity_Nm += change.gravity_Nm;
-        log.load.load.inertia_kg_m2 += change.inertia_kg_m2;
-        log.load.load.zero_rad += change.zero_rad;
-      }
-      all.push_back(&log);
+      if (e >= log.load.errors.size()) continue;
+      const JointLoad& change = log.load.errors[e].change;
+      log.load.load.gravity_Nm += factor * change.gravity_Nm;
+      log.load.load.inertia_kg_m2 += factor * change.inertia_kg_m2;
+      log.load.load.zero_rad += factor * change.zero_rad;
     }
-    moved[e] = refit_drive(all, terms, values, options).values;
+    squares[e] = squared_changes(problem, changed, factor, terms, values, options);
   });
-  std::vector<double> variances;
-  for (const SearchedDriveParameter& parameter : problem.searched) {
-    double square = 0.0;
-    for (const DriveValues& fit : moved) {
-      const double away = in_search(parameter, fit[parameter.index]) -
-                          in_search(parameter, values[parameter.index]);
-      square += away * away;
-    }
-    variances.push_back(square);
-  }
+  std::vector<double> variances(problem.searched.size(), 0.0);
+  for (const std::vector<double>& square : squares)
+    for (std::size_t k = 0; k < variances.size(); ++k) variances[k] += square[k];
   return variances;
+}
+
+/// The same from the error of the laws' gain.
+std::vector<double> from_gain(const DriveProblem& problem, const std::vector<DriveLog>& logs,
+                              double relative_error, const DriveTerms& terms,
+                              const DriveValues& values, const DriveFitOptions& options) {
+  const double factor = enlargement(relative_error);
+  std::vector<DriveLog> changed = logs;
+  for (DriveLog& log : changed) log.gain *= 1.0 + factor * relative_error;
+  return squared_changes(problem, changed, factor, terms, values, options);
 }
 
 void set_errors(const SearchedDriveParameter& searched, double variance, double load_variance,
@@ -102,7 +144,8 @@ void set_errors(const SearchedDriveParameter& searched, double variance, double 
 
 std::vector<IdentifiedDriveParameter> parameters_with_errors(
     const std::vector<DriveLog>& logs, const DriveTerms& terms, const DriveValues& values,
-    bool wants_errors, const DriveFitOptions& options, std::size_t threads) {
+    bool wants_errors, double relative_gain_error, const DriveFitOptions& options,
+    std::size_t threads) {
   const DriveLogs all = pointers_to(logs);
   const DriveProblem problem = drive_problem(all, terms, options);
   std::vector<double> variances;
@@ -111,6 +154,11 @@ std::vector<IdentifiedDriveParameter> parameters_with_errors(
   if (has_errors) {
     variances = jackknife(problem, logs, terms, values, options, threads);
     load_variances = from_load(problem, logs, terms, values, options, threads);
+  }
+  if (has_errors && relative_gain_error > 0.0) {
+    const std::vector<double> more =
+        from_gain(problem, logs, relative_gain_error, terms, values, options);
+    for (std::size_t k = 0; k < more.size(); ++k) variances[k] += more[k];
   }
   std::vector<IdentifiedDriveParameter> parameters;
   parameters.reserve(problem.searched.size());

@@ -162,7 +162,8 @@ void read_results(const JsonObject& document, const std::string& place,
   });
   if (document.has("error_gain"))
     identified.error_gain = document.object("error_gain", [](const JsonObject& of) {
-      return MeasuredErrorGain{of.number("value_1_rad"), of.number("residual_duty_1"),
+      return MeasuredErrorGain{of.number("value_1_rad"), of.number("standard_error_1_rad"),
+                               of.number("delay_s"), of.number("residual_duty_1"),
                                of.whole_number("samples")};
     });
 }
@@ -217,9 +218,12 @@ DriveFileJson drive_document(const DriveIdentification& identified) {
                          {"load_file", load_sheet_json(identified.load)},
                          {"drive_file", drive_sheet_json(identified.drive)}};
   if (identified.error_gain)
-    document["error_gain"] = {{"value_1_rad", identified.error_gain->value_1_rad},
-                              {"residual_duty_1", identified.error_gain->residual_duty_1},
-                              {"samples", identified.error_gain->samples}};
+    document["error_gain"] = {
+        {"value_1_rad", identified.error_gain->value_1_rad},
+        {"standard_error_1_rad", json_number(identified.error_gain->standard_error_1_rad)},
+        {"delay_s", identified.error_gain->delay_s},
+        {"residual_duty_1", identified.error_gain->residual_duty_1},
+        {"samples", identified.error_gain->samples}};
   return document;
 }
 

@@ -245,10 +245,15 @@ std::vector<double> weights_by_error(const DriveProblem& problem, const DriveVal
   return weights;
 }
 
-DriveSolution reweighted(DriveProblem problem, const DriveValues& start,
+/// The cost of the solution is that of equal weights, so that structures can be compared.
+DriveSolution reweighted(const DriveProblem& problem, const DriveValues& start,
                          const DriveFitOptions& options) {
-  problem.log_weights = weights_by_error(problem, start);
-  return descend(problem, start, 0.0, std::span(kDifferences).last(2), 12, options.progress);
+  DriveProblem weighted = problem;
+  weighted.log_weights = weights_by_error(problem, start);
+  DriveSolution best =
+      descend(weighted, start, 0.0, std::span(kDifferences).last(2), 12, options.progress);
+  best.cost = loss_of(problem, best.values, 0.0);
+  return best;
 }
 
 /// Where a fall ends depends on friction so steeply that a search from afar stays there: recordings with power first.
@@ -329,7 +334,7 @@ DriveProblem drive_problem(const DriveLogs& logs, const DriveTerms& terms,
       searched.lowest = 0.0;
     problem.searched.push_back(searched);
   }
-  const RolloutOptions rollout{.terms = terms, .step_s = step_s};
+  const RolloutOptions rollout{.terms = terms, .step_s = step_s, .integrator = options.integrator};
   problem.roll_out = [rollout](const DriveLog& log, const DriveRun& run,
                                const DriveLanes& parameters, double* angle_rad) {
     roll_out(log, run, parameters, rollout, {.angle_rad = angle_rad});

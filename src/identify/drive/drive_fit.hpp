@@ -18,6 +18,7 @@ struct DriveFitOptions {
   std::size_t starts = 3;
   std::uint64_t seed = 1;
   double step_s = 0.0;  ///< 0: `drive_step_s`
+  DriveIntegrator integrator = DriveIntegrator::midpoint_speed;
   Progress progress = {};
 };
 

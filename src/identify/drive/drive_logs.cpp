@@ -12,51 +12,10 @@
 #include "data/channel_names.hpp"
 #include "data/names.hpp"
 #include "joint_load/load_fact.hpp"
-#include "numerics/quantile.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
-
-constexpr std::size_t kFewestSamples = 20;
-
-const std::vector<double>& finite_channel(const Recording& recording, const std::string& name) {
-  const std::vector<double>& values = recording.channel(name).values;
-  const auto wrong =
-      std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
-  if (wrong == values.end()) return values;
-  const auto sample = static_cast<std::size_t>(wrong - values.begin());
-  throw Error({.place = fmt::format("{}, {}, t = {:.4g} s", recording.name(), name,
-                                    recording.time_s(sample)),
-               .expected = "a finite value, as a free run passes through every sample",
-               .found = fmt::format("{}", *wrong),
-               .advice = "Cut the recording there (from, to or split_at_gaps in a mapping)."});
-}
-
-std::string command_channel(const Recording& recording, const DriveSheet& drive) {
-  const std::vector<std::string> wanted =
-      drive.command.empty() ? command_channels(drive.law) : std::vector<std::string>{drive.command};
-  for (const std::string& channel : wanted)
-    if (recording.has(channel)) return channel;
-  throw Error(
-      {.place = recording.name(),
-       .expected = fmt::format("the command of the law '{}': {}", name(drive.law), joined(wanted)),
-       .found = "the channels " + joined(channel_names(recording.channels())),
-       .advice = "Name its channel as 'command' in the drive file, or map the column to it."});
-}
-
-/// 1 for the half of the samples in which the error changes least: goal, angle and duty are read one after the other, so
-/// that they do not belong together in a fast motion.
-std::vector<double> slow_samples(const std::vector<double>& goal,
-                                 const std::vector<double>& angle) {
-  std::vector<double> change(goal.size(), 0.0);
-  for (std::size_t n = 1; n + 1 < goal.size(); ++n)
-    change[n] =
-        std::max(std::abs(goal[n + 1] - goal[n - 1]), std::abs(angle[n + 1] - angle[n - 1]));
-  const double limit = quantile(change, 0.5);
-  for (double& value : change) value = value <= limit ? 1.0 : 0.0;
-  return change;
-}
 
 /// The ratio of the drive file, else the condition of the recording, else 1.
 double gear_ratio(const Recording& recording, const DriveSheet& drive) {
@@ -124,17 +83,32 @@ std::vector<double> ends_of_commands(const std::vector<double>& command) {
   return ends;
 }
 
-/// The angle that the free runs are compared with, after the gear.
-std::vector<double> angle_after_gear(const Recording& recording, const DriveSheet& drive) {
-  const std::string name = angle_channel(recording, drive);
-  std::vector<double> angle_rad = finite_channel(recording, name);
-  if (name != "motor_angle_rad") return angle_rad;
-  const double ratio = gear_ratio(recording, drive);
-  for (double& value : angle_rad) value /= ratio;
-  return angle_rad;
+}  // namespace
+
+const std::vector<double>& finite_channel(const Recording& recording, const std::string& name) {
+  const std::vector<double>& values = recording.channel(name).values;
+  const auto wrong =
+      std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
+  if (wrong == values.end()) return values;
+  const auto sample = static_cast<std::size_t>(wrong - values.begin());
+  throw Error({.place = fmt::format("{}, {}, t = {:.4g} s", recording.name(), name,
+                                    recording.time_s(sample)),
+               .expected = "a finite value, as a free run passes through every sample",
+               .found = fmt::format("{}", *wrong),
+               .advice = "Cut the recording there (from, to or split_at_gaps in a mapping)."});
 }
 
-}  // namespace
+std::string command_channel(const Recording& recording, const DriveSheet& drive) {
+  const std::vector<std::string> wanted =
+      drive.command.empty() ? command_channels(drive.law) : std::vector<std::string>{drive.command};
+  for (const std::string& channel : wanted)
+    if (recording.has(channel)) return channel;
+  throw Error(
+      {.place = recording.name(),
+       .expected = fmt::format("the command of the law '{}': {}", name(drive.law), joined(wanted)),
+       .found = "the channels " + joined(channel_names(recording.channels())),
+       .advice = "Name its channel as 'command' in the drive file, or map the column to it."});
+}
 
 std::string angle_channel(const Recording& recording, const DriveSheet& drive) {
   constexpr std::array<std::string_view, 3> kAngles{"motor_angle_rad", "gear_angle_rad",
@@ -150,13 +124,22 @@ std::string angle_channel(const Recording& recording, const DriveSheet& drive) {
        .advice = "Name its channel as 'angle' in the drive file, or map the column to it."});
 }
 
+std::vector<double> angle_after_gear(const Recording& recording, const DriveSheet& drive) {
+  const std::string name = angle_channel(recording, drive);
+  std::vector<double> angle_rad = finite_channel(recording, name);
+  if (name != "motor_angle_rad") return angle_rad;
+  const double ratio = gear_ratio(recording, drive);
+  for (double& value : angle_rad) value /= ratio;
+  return angle_rad;
+}
+
 DriveLog drive_log(const Recording& recording, const LoadSheet& load, const DriveSheet& drive) {
   DriveLog log;
   log.name = recording.name();
   log.sample_period_s = 1.0 / recording.sample_rate_Hz();
-  if (recording.size() < kFewestSamples)
+  if (recording.size() < kFewestDriveSamples)
     throw Error({.place = recording.name(),
-                 .expected = fmt::format("at least {} samples", kFewestSamples),
+                 .expected = fmt::format("at least {} samples", kFewestDriveSamples),
                  .found = fmt::format("{}", recording.size())});
   log.angle_rad = angle_after_gear(recording, drive);
   set_law(recording, drive, log);
@@ -172,45 +155,6 @@ std::vector<DriveLog> drive_logs(const std::vector<Recording>& recordings, const
   logs.reserve(recordings.size());
   for (const Recording& recording : recordings) logs.push_back(drive_log(recording, load, drive));
   return logs;
-}
-
-MeasuredDrive measured_drive(const std::vector<Recording>& recordings, const DriveSheet& sheet) {
-  MeasuredDrive measured{.sheet = sheet, .error_gain = {}};
-  if (sheet.law != DriveLaw::position || sheet.error_gain_1_rad) return measured;
-  double product = 0.0;
-  double square = 0.0;
-  double duty_square = 0.0;
-  std::size_t samples = 0;
-  for (const Recording& recording : recordings) {
-    if (!recording.has("duty_1")) continue;
-    const std::vector<double>& duty = finite_channel(recording, "duty_1");
-    const std::vector<double>& goal = finite_channel(recording, command_channel(recording, sheet));
-    const std::vector<double> angle = angle_after_gear(recording, sheet);
-    const double gain = fact_in(sheet.gain, recording, sheet.file, "gain");
-    const std::vector<double> slow = slow_samples(goal, angle);
-    for (std::size_t n = 0; n < duty.size(); ++n) {
-      if (recording.has("enabled_1") && recording.channel("enabled_1").values[n] == 0.0) continue;
-      if (std::abs(duty[n]) > 0.95 * sheet.max_duty_1 || slow[n] == 0.0) continue;
-      const double error = gain * (goal[n] - angle[n]);
-      product += error * duty[n];
-      square += error * error;
-      duty_square += duty[n] * duty[n];
-      ++samples;
-    }
-  }
-  if (samples < kFewestSamples || square <= 0.0 || product <= 0.0)
-    throw Error({.place = sheet.file,
-                 .expected = "error_gain, the duty for an error of 1 rad at gain 1, or duty_1 in "
-                             "the recordings to measure "
-                             "it from",
-                 .found = samples == 0 ? "no recording with duty_1 below its limit"
-                                       : "a duty that does not follow the error",
-                 .advice = "State 'error_gain' in the drive file (--drive)."});
-  const double gain = product / square;
-  measured.sheet.error_gain_1_rad = gain;
-  const double rest = std::max(duty_square - gain * product, 0.0);
-  measured.error_gain = {gain, std::sqrt(rest / static_cast<double>(samples)), samples};
-  return measured;
 }
 
 namespace {

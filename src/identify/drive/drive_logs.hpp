@@ -1,23 +1,27 @@
 #pragma once
 
-#include <optional>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "identify/drive/drive_log.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/identify/drive/drive_sheet.hpp"
-#include "torsio/identify/drive/identify_drive.hpp"
 
 namespace torsio {
 
-/// The drive file with the error gain that the duty of the recordings shows, if it is to be measured.
-struct MeasuredDrive {
-  DriveSheet sheet;
-  std::optional<MeasuredErrorGain> error_gain;
-};
-[[nodiscard]] MeasuredDrive measured_drive(const std::vector<Recording>& recordings,
-                                           const DriveSheet& sheet);
+inline constexpr std::size_t kFewestDriveSamples = 20;
+
+/// @throws Error naming the first sample that is not finite.
+[[nodiscard]] const std::vector<double>& finite_channel(const Recording& recording,
+                                                        const std::string& name);
+
+/// Name of the channel that the law's command is in.
+[[nodiscard]] std::string command_channel(const Recording& recording, const DriveSheet& drive);
+
+/// The angle that the free runs are compared with, after the gear.
+[[nodiscard]] std::vector<double> angle_after_gear(const Recording& recording,
+                                                   const DriveSheet& drive);
 
 /// @throws Error naming recording and channel if one is missing or has a value that is not finite.
 [[nodiscard]] DriveLog drive_log(const Recording& recording, const LoadSheet& load,

@@ -1,9 +1,12 @@
 #include "identify/drive/drive_rollout.hpp"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
+
+#include "core/aligned_vector.hpp"
 
 // Highway compiles this file once for each instruction set; the order of its headers matters.
 // clang-format off
@@ -48,78 +51,121 @@ class Rollout {
   HWY_INLINE Rollout(const DriveLog& log, const DriveRun& run, const DriveLanes& lanes,
                      std::size_t at, const RolloutOptions& options)
       : log_(log), run_(run), of_(lanes, at), at_(at) {
-    using enum DriveTerm;
-    has_delay_ = has(options.terms, delay);
-    has_load_ = has(options.terms, load_friction);
-    has_load_stribeck_ = has(options.terms, load_stribeck);
-    has_stribeck_ = has(options.terms, stribeck);
-    has_rise_ = has(options.terms, resistance_rise);
-    has_exponent_ = has(options.terms, duty_exponent);
-    has_speed_limit_ = has(options.terms, speed_limit);
-    has_spring_ = has(options.terms, spring);
-    has_hysteresis_ = has(options.terms, hysteresis);
-    has_backlash_ = has(options.terms, backlash);
-    has_presliding_ = has(options.terms, presliding);
+    set_terms(options.terms);
     is_law_delayed_ = log.kind == CommandKind::goal_to_torque;
     command_end_ = log.command_end.empty() ? log.command.data() + 1 : log.command_end.data();
+    is_second_order_ = options.integrator == DriveIntegrator::midpoint_speed;
     substeps_ = static_cast<std::size_t>(std::ceil(log.sample_period_s / options.step_s - 1e-6));
     substeps_ = std::max<std::size_t>(substeps_, 1);
     step_s_ = log.sample_period_s / static_cast<double>(substeps_);
-    gravity_ = constant(log.load.load.gravity_Nm);
-    zero_ = hn::Add(of_(DriveParameter::zero), constant(log.load.load.zero_rad));
-    const V load =
-        hn::Add(constant(log.load.load.inertia_kg_m2), of_(DriveParameter::joint_inertia));
-    const V moved =
-        has_spring_ ? of_(DriveParameter::armature) : hn::Add(load, of_(DriveParameter::armature));
-    inverse_inertia_ = hn::Div(constant(1.0), moved);
-    momentum_ = hn::Div(moved, constant(step_s_));
-    joint_inverse_inertia_ = hn::Div(constant(1.0), load);
-    joint_momentum_ = hn::Div(load, constant(step_s_));
-    if (has_speed_limit_)
-      speed_slope_ = hn::Div(of_(DriveParameter::stall_torque), of_(DriveParameter::no_load_speed));
-    inverse_load_speed_ = hn::Div(constant(1.0), of_(DriveParameter::load_speed));
-    inverse_stribeck_speed_ = hn::Div(constant(1.0), of_(DriveParameter::stribeck_speed));
-    if (has_hysteresis_)
-      inverse_width_ = hn::Div(constant(1.0), of_(DriveParameter::hysteresis_width));
-    if (has_presliding_)
-      inverse_presliding_ = hn::Div(constant(1.0), of_(DriveParameter::presliding));
-    const double corner = log.speed_filter_rad_s * step_s_;
-    speed_share_ = constant(log.speed_filter_rad_s > 0.0 ? 1.0 - std::exp(-corner) : 1.0);
+    kick_s_ = is_second_order_ ? 0.5 * step_s_ : step_s_;
+    set_constants();
+    if (has_delay_ && is_law_delayed_) make_ring(lanes);
     angle_ = constant(run.angle_rad);
     speed_ = constant(run.speed_rad_s);
     filtered_speed_ = speed_;
     joint_angle_ = has_spring_ ? hanging_joint() : angle_;
     joint_speed_ = speed_;
   }
-
   HWY_INLINE void run(const RolloutOutput& output) {
     for (std::size_t n = 0; n < run_.samples; ++n) {
       store(angle_, output.angle_rad, n);
       store(joint_angle_, output.joint_angle_rad, n);
       if (n + 1 == run_.samples && output.joint_torque_Nm == nullptr) return;
-      is_on_ = log_.enabled.empty() || log_.enabled[run_.first + n] != 0.0;
       for (std::size_t k = 0; k < substeps_; ++k) {
+        // A kick around a sample has half of its time before it.
+        power_ = power_at(run_.first + n);
+        if (is_second_order_ && k == 0 && n > 0)
+          power_ = 0.5 * (power_ + power_at(run_.first + n - 1));
         step(run_.first + n, static_cast<double>(k) / static_cast<double>(substeps_));
         if (k == 0) store(joint_torque_, output.joint_torque_Nm, n);
+        kick_s_ = step_s_;
       }
     }
   }
 
  private:
+  HWY_INLINE void set_terms(const DriveTerms& terms) {
+    using enum DriveTerm;
+    has_delay_ = has(terms, delay);
+    has_load_ = has(terms, load_friction);
+    has_load_stribeck_ = has(terms, load_stribeck);
+    has_stribeck_ = has(terms, stribeck);
+    has_rise_ = has(terms, resistance_rise);
+    has_exponent_ = has(terms, duty_exponent);
+    has_speed_limit_ = has(terms, speed_limit);
+    has_spring_ = has(terms, spring);
+    has_hysteresis_ = has(terms, hysteresis);
+    has_backlash_ = has(terms, backlash);
+    has_presliding_ = has(terms, presliding);
+  }
+
+  HWY_INLINE void set_constants() {
+    gravity_ = constant(log_.load.load.gravity_Nm);
+    zero_ = hn::Add(of_(DriveParameter::zero), constant(log_.load.load.zero_rad));
+    joint_inertia_ =
+        hn::Add(constant(log_.load.load.inertia_kg_m2), of_(DriveParameter::joint_inertia));
+    inertia_ = has_spring_ ? of_(DriveParameter::armature)
+                           : hn::Add(joint_inertia_, of_(DriveParameter::armature));
+    if (has_speed_limit_)
+      speed_slope_ = hn::Div(of_(DriveParameter::stall_torque), of_(DriveParameter::no_load_speed));
+    if (has_load_stribeck_)
+      inverse_load_speed_ = hn::Div(constant(1.0), of_(DriveParameter::load_speed));
+    if (has_stribeck_)
+      inverse_stribeck_speed_ = hn::Div(constant(1.0), of_(DriveParameter::stribeck_speed));
+    if (has_hysteresis_)
+      inverse_width_ = hn::Div(constant(1.0), of_(DriveParameter::hysteresis_width));
+    if (has_presliding_)
+      inverse_presliding_ = hn::Div(constant(1.0), of_(DriveParameter::presliding));
+    const double corner = log_.speed_filter_rad_s * step_s_;
+    speed_share_ = constant(log_.speed_filter_rad_s > 0.0 ? 1.0 - std::exp(-corner) : 1.0);
+  }
+
+  // Room for the longest delay of the lanes.
+  HWY_INLINE void make_ring(const DriveLanes& lanes) {
+    constexpr double kMaxSteps = 1e6;
+    double longest_s = 0.0;
+    for (const double delay_s : lanes.of[static_cast<std::size_t>(DriveParameter::delay)])
+      longest_s = std::max(longest_s, delay_s);
+    max_steps_ = std::floor(std::min(longest_s / step_s_, kMaxSteps)) + 1.0;
+    ring_mask_ = std::bit_ceil(static_cast<std::size_t>(max_steps_) + 2) - 1;
+    ring_.resize((ring_mask_ + 1) * hn::MaxLanes(D()));
+  }
+
   HWY_INLINE void store(V value, double* out, std::size_t sample) const {
     if (out != nullptr) hn::Store(value, D(), out + sample * kDriveLanes + at_);
   }
 
+  HWY_INLINE double power_at(std::size_t sample) const {
+    return log_.enabled.empty() || log_.enabled[sample] != 0.0 ? 1.0 : 0.0;
+  }
+
   // The spring carries the load, as if it were at rest; without a start of the joint in the log that is the best guess.
+  // q + deflection sin(q + zero) = angle by Newton's method, by halves where that leaves the bounds.
   HWY_INLINE V hanging_joint() const {
-    const V compliance = hn::Div(constant(1.0), of_(DriveParameter::stiffness));
+    const V deflection = hn::Div(gravity_, of_(DriveParameter::stiffness));
+    V low = hn::Sub(angle_, deflection);
+    V high = hn::Add(angle_, deflection);
     V joint = angle_;
-    for (int k = 0; k < 8; ++k)
-      joint = hn::NegMulAdd(hn::Mul(gravity_, compliance), sine(hn::Add(joint, zero_)), angle_);
+    for (int k = 0; k < 30; ++k) {
+      const V place = hn::Add(joint, zero_);
+      const V error = hn::Sub(hn::MulAdd(deflection, sine(place), joint), angle_);
+      const auto is_above = hn::Gt(error, hn::Zero(D()));
+      high = hn::IfThenElse(is_above, joint, high);
+      low = hn::IfThenElse(is_above, low, joint);
+      const V slope =
+          hn::MulAdd(deflection, sine(hn::Add(place, constant(0.5 * kPi))), constant(1.0));
+      const V next = hn::Sub(joint, hn::Div(error, slope));
+      const auto is_inside = hn::And(hn::Ge(next, low), hn::Le(next, high));  // no NaN
+      const V before = joint;
+      joint = hn::IfThenElse(is_inside, next, hn::Mul(constant(0.5), hn::Add(low, high)));
+      if (hn::AllTrue(D(), hn::Le(hn::Abs(hn::Sub(joint, before)), constant(1e-12)))) break;
+    }
     return joint;
   }
 
-  // The command at a fraction of the period after a sample, interpolated between its stamps, except where it jumps.
+  // The command at a fraction of the period after a sample, interpolated between its stamps, except where it jumps: there
+  // the mean of both sides.
   HWY_INLINE V command(std::size_t sample, double fraction) const {
     const auto last = static_cast<double>(log_.size() - 1);
     const double now = static_cast<double>(sample) + fraction;
@@ -127,6 +173,8 @@ class Rollout {
       const double place = std::min(now, last);
       const auto below = std::min(static_cast<std::size_t>(place), log_.size() - 2);
       const double share = place - static_cast<double>(below);
+      if (is_second_order_ && fraction == 0.0 && sample > run_.first)
+        return constant(0.5 * (log_.command[sample] + command_end_[sample - 1]));
       return constant(log_.command[below] + share * (command_end_[below] - log_.command[below]));
     }
     const V delayed = hn::NegMulAdd(of_(DriveParameter::delay),
@@ -147,18 +195,22 @@ class Rollout {
     return has_delay_ ? delayed(wanted) : wanted;
   }
 
-  // `wanted` as it was one delay ago; from the ring of past values, between them on straight lines.
+  // `wanted` as it was one delay ago, interpolated in the ring of past values.
   HWY_INLINE V delayed(V wanted) {
-    constexpr std::size_t kMask = kSlots - 1;
-    hn::Store(wanted, D(), ring_.data() + (newest_ & kMask) * hn::MaxLanes(D()));
+    const std::size_t width = hn::MaxLanes(D());
+    if (newest_ == 0)
+      for (std::size_t k = 0; k <= ring_mask_; ++k)
+        hn::Store(wanted, D(), ring_.data() + k * width);
+    hn::Store(wanted, D(), ring_.data() + (newest_ & ring_mask_) * width);
     const V age = hn::Mul(of_(DriveParameter::delay), constant(1.0 / step_s_));
-    const V steps = hn::Min(hn::Max(age, hn::Zero(D())), constant(static_cast<double>(kSlots - 2)));
+    const V steps = hn::Min(hn::Max(age, hn::Zero(D())), constant(max_steps_));
     const V whole = hn::Floor(steps);
-    const V newest = constant(static_cast<double>(newest_));
+    const V newest = constant(static_cast<double>(newest_ + ring_mask_ + 1));
     const auto slot = [&](V past) HWY_ATTR {
       const Index tag;
-      const auto ring = hn::And(hn::ConvertTo(tag, hn::Sub(newest, past)), hn::Set(tag, kMask));
-      return hn::Add(hn::Mul(ring, hn::Set(tag, static_cast<std::int64_t>(hn::MaxLanes(D())))),
+      const auto ring = hn::And(hn::ConvertTo(tag, hn::Sub(newest, past)),
+                                hn::Set(tag, static_cast<std::int64_t>(ring_mask_)));
+      return hn::Add(hn::Mul(ring, hn::Set(tag, static_cast<std::int64_t>(width))),
                      hn::Iota(tag, 0));
     };
     const V recent = hn::GatherIndex(D(), ring_.data(), slot(whole));
@@ -168,21 +220,29 @@ class Rollout {
   }
 
   HWY_INLINE V winding_torque(V duty) {
-    if (!is_on_ && !log_.brakes_when_off) return hn::Zero(D());
-    if (!is_on_) duty = hn::Zero(D());
+    electric_damping_ = hn::Zero(D());
+    if (power_ == 0.0 && !log_.brakes_when_off) return hn::Zero(D());
     const V size = hn::Abs(duty);
     if (has_exponent_) {
-      const V log_size = hn::Log(D(), hn::Max(size, constant(1e-9)));
-      duty =
-          hn::CopySign(hn::Exp(D(), hn::Mul(of_(DriveParameter::duty_exponent), log_size)), duty);
+      constexpr double kSmallest = 1e-9;
+      const V log_size = hn::Log(D(), hn::Max(size, constant(kSmallest)));
+      const V power = hn::Exp(D(), hn::Mul(of_(DriveParameter::duty_exponent), log_size));
+      duty = hn::IfThenElse(hn::Gt(size, constant(kSmallest)), hn::CopySign(power, duty),
+                            hn::Zero(D()));
     }
     V resistance = of_(DriveParameter::resistance);
     if (has_rise_)
       resistance =
           hn::MulAdd(of_(DriveParameter::resistance_rise), hn::Mul(size, size), resistance);
     const V constant_Nm_A = of_(DriveParameter::torque_constant);
-    const V voltage = hn::NegMulAdd(constant_Nm_A, speed_, hn::Mul(constant(log_.supply_V), duty));
-    return hn::Mul(constant_Nm_A, hn::Div(voltage, resistance));
+    // The power switches all of the torque of an open winding, and the duty of one that is shorted.
+    const double closed = log_.brakes_when_off ? 1.0 : power_;
+    const V Nm_V = hn::Mul(constant(closed), hn::Div(constant_Nm_A, resistance));
+    electric_damping_ = hn::Mul(Nm_V, constant_Nm_A);
+    const V voltage = hn::NegMulAdd(
+        constant_Nm_A, speed_,
+        hn::Mul(constant(log_.supply_V * (log_.brakes_when_off ? power_ : 1.0)), duty));
+    return hn::Mul(Nm_V, voltage);
   }
 
   // What the supply leaves of a commanded torque at this speed.
@@ -202,11 +262,11 @@ class Rollout {
       case CommandKind::duty: return winding_torque(input);
       case CommandKind::goal_to_torque: {
         const V torque = law_torque(input);
-        return is_on_ ? within_supply(torque) : hn::Zero(D());
+        return hn::Mul(constant(power_), within_supply(torque));
       }
       case CommandKind::current:
-        return is_on_ ? hn::Mul(of_(DriveParameter::torque_constant), input) : hn::Zero(D());
-      case CommandKind::torque: return is_on_ ? within_supply(input) : hn::Zero(D());
+        return hn::Mul(constant(power_), hn::Mul(of_(DriveParameter::torque_constant), input));
+      case CommandKind::torque: return hn::Mul(constant(power_), within_supply(input));
     }
     return hn::Zero(D());
   }
@@ -224,8 +284,13 @@ class Rollout {
     return friction;
   }
 
+  // The inertia with which a kick by the torques at the old speed has the mean of `damping` over the step.
+  HWY_INLINE V effective_inertia(V inertia, V damping) const {
+    return is_second_order_ ? hn::MulAdd(constant(0.5 * kick_s_), damping, inertia) : inertia;
+  }
+
   // On the motor's side: what opposes `driving`, the sum of all other torques.
-  HWY_INLINE V friction_torque(V driving, V load) {
+  HWY_INLINE V friction_torque(V driving, V load, V inertia) {
     const V viscous = of_(DriveParameter::viscous);
     if (has_presliding_) {
       const V moved = hn::Mul(hn::Mul(hn::Abs(speed_), constant(step_s_)), inverse_presliding_);
@@ -235,7 +300,20 @@ class Rollout {
       return hn::MulAdd(dry_friction(load), bristle_, hn::Mul(viscous, speed_));
     }
     const V bound = hn::MulAdd(viscous, hn::Abs(speed_), dry_friction(load));
-    return within(hn::MulAdd(momentum_, speed_, driving), bound);
+    return within(stopping(driving, inertia, speed_), bound);
+  }
+
+  // The torque that stops a mass within the kick.
+  HWY_INLINE V stopping(V driving, V inertia, V speed) const {
+    return hn::MulAdd(hn::Mul(inertia, constant(1.0 / kick_s_)), speed, driving);
+  }
+
+  HWY_INLINE V kicked(V speed, V torque, V inertia) const {
+    return hn::MulAdd(constant(kick_s_), hn::Div(torque, inertia), speed);
+  }
+
+  HWY_INLINE V motor_inertia() const {
+    return effective_inertia(inertia_, hn::Add(electric_damping_, of_(DriveParameter::viscous)));
   }
 
   HWY_INLINE void step(std::size_t sample, double fraction) {
@@ -248,18 +326,22 @@ class Rollout {
     const V load = hn::Abs(hn::Sub(hn::Mul(motor, hn::Add(one, direction)),
                                    hn::Mul(gravity, hn::Sub(one, direction))));
     const V driving = hn::Add(motor, gravity);
-    const V friction = friction_torque(driving, load);
+    const V inertia = motor_inertia();
+    const V friction = friction_torque(driving, load, inertia);
     joint_torque_ = hn::Sub(motor, friction);
-    speed_ = hn::MulAdd(hn::Mul(dt, inverse_inertia_), hn::Sub(driving, friction), speed_);
+    speed_ = kicked(speed_, hn::Sub(driving, friction), inertia);
     angle_ = hn::MulAdd(dt, speed_, angle_);
     joint_angle_ = angle_;
   }
 
   HWY_INLINE V spring_torque(V dt) {
     V deflection = hn::Sub(angle_, joint_angle_);
-    if (has_backlash_)
-      deflection = hn::Sub(deflection, within(deflection, of_(DriveParameter::backlash)));
-    const V rate = hn::Sub(speed_, joint_speed_);
+    V rate = hn::Sub(speed_, joint_speed_);
+    if (has_backlash_) {
+      const V play = of_(DriveParameter::backlash);
+      rate = hn::IfThenZeroElse(hn::Lt(hn::Abs(deflection), play), rate);
+      deflection = hn::Sub(deflection, within(deflection, play));
+    }
     V torque = hn::MulAdd(of_(DriveParameter::stiffness), deflection,
                           hn::Mul(of_(DriveParameter::spring_damping), rate));
     if (has_hysteresis_) {
@@ -273,21 +355,21 @@ class Rollout {
     const V spring = spring_torque(dt);
     joint_torque_ = spring;
     const V driving = hn::Sub(motor, spring);
-    const V friction = friction_torque(driving, hn::Abs(spring));
+    const V inertia = motor_inertia();
+    const V friction = friction_torque(driving, hn::Abs(spring), inertia);
     const V gravity = hn::Mul(gravity_, sine(hn::Add(joint_angle_, zero_)));
     const V on_joint = hn::Sub(spring, gravity);
     const V bound = hn::MulAdd(of_(DriveParameter::bearing_viscous), hn::Abs(joint_speed_),
                                of_(DriveParameter::bearing));
-    const V bearing = within(hn::MulAdd(joint_momentum_, joint_speed_, on_joint), bound);
-    speed_ = hn::MulAdd(hn::Mul(dt, inverse_inertia_), hn::Sub(driving, friction), speed_);
+    const V joint_inertia = effective_inertia(joint_inertia_, of_(DriveParameter::bearing_viscous));
+    const V bearing = within(stopping(on_joint, joint_inertia, joint_speed_), bound);
+    speed_ = kicked(speed_, hn::Sub(driving, friction), inertia);
     angle_ = hn::MulAdd(dt, speed_, angle_);
-    joint_speed_ =
-        hn::MulAdd(hn::Mul(dt, joint_inverse_inertia_), hn::Sub(on_joint, bearing), joint_speed_);
+    joint_speed_ = kicked(joint_speed_, hn::Sub(on_joint, bearing), joint_inertia);
     joint_angle_ = hn::MulAdd(dt, joint_speed_, joint_angle_);
   }
 
-  static constexpr std::size_t kSlots =
-      128;  // a power of two, more than the longest delay in steps
+  static constexpr double kPi = std::numbers::pi;
 
   const DriveLog& log_;
   const DriveRun& run_;
@@ -297,18 +379,23 @@ class Rollout {
   bool has_delay_, has_load_, has_load_stribeck_, has_stribeck_, has_rise_, has_exponent_,
       has_speed_limit_, has_spring_;
   bool has_hysteresis_, has_backlash_, has_presliding_, is_law_delayed_;
-  bool is_on_ = true;
+  bool is_second_order_;
+  double power_ = 1.0;  ///< share of the kick in which the power is on
   std::size_t substeps_ = 1;
   double step_s_ = 0.0;
-  V gravity_, zero_, inverse_inertia_, momentum_, joint_inverse_inertia_, joint_momentum_;
-  V inverse_load_speed_, inverse_stribeck_speed_;
+  double kick_s_ = 0.0;  ///< time for which torques act on the speeds: half a step at first
+  V gravity_, zero_, inertia_, joint_inertia_;
+  V inverse_load_speed_ = hn::Zero(D()), inverse_stribeck_speed_ = hn::Zero(D());
   V speed_slope_ = hn::Zero(D());
   V inverse_width_ = hn::Zero(D()), inverse_presliding_ = hn::Zero(D());
   V speed_share_;
   V angle_, speed_, filtered_speed_, joint_angle_, joint_speed_;
   V bristle_ = hn::Zero(D()), stop_ = hn::Zero(D()), joint_torque_ = hn::Zero(D());
-  std::size_t newest_ = kSlots;
-  HWY_ALIGN std::array<double, kSlots * hn::MaxLanes(D())> ring_ = {};
+  V electric_damping_ = hn::Zero(D());
+  double max_steps_ = 0.0;  ///< length of the delay
+  std::size_t newest_ = 0;
+  std::size_t ring_mask_ = 0;
+  detail::AlignedVector<double> ring_;
 };
 
 void roll_out_lanes(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "identify/drive/drive_log.hpp"
 #include "torsio/identify/drive/drive_model.hpp"
@@ -33,9 +34,18 @@ struct DriveRun {
   double speed_rad_s = 0.0;
 };
 
+enum class DriveIntegrator : std::uint8_t {
+  /// Second order: speeds are those in the middle of a step, and the damping by viscous friction and by the winding is
+  /// the mean over the step.
+  midpoint_speed,
+  /// First order, with forces from the beginning of a step: what other simulators have.
+  semi_implicit_euler,
+};
+
 struct RolloutOptions {
   DriveTerms terms;       ///< terms that are computed at all
   double step_s = 0.001;  ///< longest step of the integrator, a sample period at most
+  DriveIntegrator integrator = DriveIntegrator::midpoint_speed;
 };
 
 /// Where a rollout puts its values, [sample][lane]; null: not wanted.
@@ -46,8 +56,8 @@ struct RolloutOutput {
       nullptr;  ///< on the joint: of the spring, or of the motor less friction
 };
 
-/// Free runs from the commands alone by the equations of `DriveParameter`, semi-implicit Euler; friction
-/// stops a motion and never reverses it. A run that leaves all bounds gives values that are not finite.
+/// Free runs from the commands alone by the equations of `DriveParameter`; friction stops a motion and never reverses it.
+/// Before a run begins, a law is assumed to have given the torque that it gives first. A run that leaves all bounds gives values that are not finite.
 void roll_out(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,
               const RolloutOptions& options, const RolloutOutput& output) noexcept;
 

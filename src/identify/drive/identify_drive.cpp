@@ -13,6 +13,7 @@
 #include "identify/drive/drive_errors.hpp"
 #include "identify/drive/drive_fit.hpp"
 #include "identify/drive/drive_logs.hpp"
+#include "identify/drive/error_gain.hpp"
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
 
@@ -112,6 +113,41 @@ DriveSolution best_of_starts(const GroupedLogs& all, const DriveIdentification& 
   return *std::ranges::min_element(solutions, {}, &DriveSolution::cost);
 }
 
+/// Sets the terms and the errors of recordings that were left out.
+void set_structure(const GroupedLogs& all, const DriveTerms& largest, const DriveFitOptions& fit,
+                   const IdentifyOptions& options, DriveIdentification& identified) {
+  identified.groups = all.groups;
+  identified.terms = largest;
+  if (all.groups < 2) return;
+  report_progress(options.progress, 0.0, "structure");
+  if (options.terms) {
+    set_held_out(all, hold_out(all, largest, fit, options.threads), identified);
+    return;
+  }
+  ChosenStructure chosen = choose_structure(all, largest, fit, options.threads);
+  identified.terms = chosen.held_out.terms;
+  identified.trials = std::move(chosen.trials);
+  set_held_out(all, chosen.held_out, identified);
+  if (options.has_nested_score) set_nested(all, largest, fit, options.threads, identified);
+}
+
+void set_errors_of_fit(const std::vector<DriveLog>& logs, const DriveFitOptions& fit,
+                       DriveIdentification& identified) {
+  const DriveProblem problem = drive_problem(pointers_to(logs), identified.terms, fit);
+  const DriveScore score = score_drive(problem, identified.values);
+  identified.mae_rad = score.mae_rad;
+  identified.rmse_rad = score.rmse_rad;
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    identified.recordings[k].recording = logs[k].name;
+    identified.recordings[k].group = logs[k].group;
+    identified.recordings[k].mae_rad = score.mae_of_log_rad[k];
+  }
+}
+
+double relative_error(const std::optional<MeasuredErrorGain>& gain) {
+  return gain ? gain->standard_error_1_rad / gain->value_1_rad : 0.0;
+}
+
 }  // namespace
 
 DriveIdentification identify_drive(const std::vector<Recording>& recordings, const LoadSheet& load,
@@ -126,43 +162,20 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
   identified.error_gain = measured.error_gain;
   identified.findings = check_drive_logs(recordings, logs);
   require_usable(identified.findings);
+  identified.recordings.resize(logs.size());
   const DriveFitOptions fit{.starts = options.starts,
                             .seed = options.seed,
                             .step_s = options.step_s,
                             .progress = options.progress};
-  const DriveTerms largest = largest_terms(options, load, logs.front().kind);
-  const DriveLogs pointers = pointers_to(logs);
-  const GroupedLogs all = grouped(pointers);
-  identified.groups = all.groups;
-  identified.terms = largest;
-  identified.recordings.resize(logs.size());
-  if (all.groups > 1) {
-    report_progress(options.progress, 0.0, "structure");
-    if (options.terms) {
-      set_held_out(all, hold_out(all, largest, fit, options.threads), identified);
-    } else {
-      ChosenStructure chosen = choose_structure(all, largest, fit, options.threads);
-      identified.terms = chosen.held_out.terms;
-      identified.trials = std::move(chosen.trials);
-      set_held_out(all, chosen.held_out, identified);
-      if (options.has_nested_score) set_nested(all, largest, fit, options.threads, identified);
-    }
-  }
+  const GroupedLogs all = grouped(pointers_to(logs));
+  set_structure(all, largest_terms(options, load, logs.front().kind), fit, options, identified);
   identified.step_s = drive_step_s(identified.terms, fit);
-  const DriveSolution solution = best_of_starts(all, identified, fit, options.threads);
-  identified.values = solution.values;
-  const DriveScore score =
-      score_drive(drive_problem(pointers, identified.terms, fit), solution.values);
-  identified.mae_rad = score.mae_rad;
-  identified.rmse_rad = score.rmse_rad;
-  for (std::size_t k = 0; k < logs.size(); ++k) {
-    identified.recordings[k].recording = logs[k].name;
-    identified.recordings[k].group = logs[k].group;
-    identified.recordings[k].mae_rad = score.mae_of_log_rad[k];
-  }
+  identified.values = best_of_starts(all, identified, fit, options.threads).values;
+  set_errors_of_fit(logs, fit, identified);
   report_progress(options.progress, 0.5, "standard errors");
-  identified.parameters = parameters_with_errors(logs, identified.terms, solution.values,
-                                                 options.has_standard_errors, fit, options.threads);
+  identified.parameters =
+      parameters_with_errors(logs, identified.terms, identified.values, options.has_standard_errors,
+                             relative_error(identified.error_gain), fit, options.threads);
   for (DriveFinding& finding : check_identified(logs, identified))
     identified.findings.push_back(std::move(finding));
   return identified;

@@ -124,6 +124,7 @@ Refitted refitted(const DriveIdentification& identified, const std::vector<Drive
   DriveFitOptions fit = fit_options(options);
   const double steps = std::max(1.0, std::ceil(logs.front().sample_period_s / step_s - 1e-6));
   fit.step_s = logs.front().sample_period_s / steps;
+  fit.integrator = DriveIntegrator::semi_implicit_euler;  // as in MuJoCo and Isaac Lab
   result.step_s = fit.step_s;
   const DriveLogs all = pointers_to(logs);
   result.values = fit_drive(all, result.terms, fit).values;

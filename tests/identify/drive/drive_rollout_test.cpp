@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <vector>
+
+#include "core/aligned_vector.hpp"
 
 namespace torsio {
 namespace {
@@ -95,35 +96,180 @@ std::vector<double> one_mass(const DriveLog& log, const DriveValues& p, double a
   return angles;
 }
 
+/// The outputs of one lane.
+struct Rolled {
+  std::vector<double> angle_rad;
+  std::vector<double> joint_angle_rad;
+  std::vector<double> joint_torque_Nm;
+};
+
+Rolled rolled(const DriveLog& log, const DriveRun& run, const DriveLanes& lanes,
+              const RolloutOptions& options, std::size_t lane = 0) {
+  detail::AlignedVector<double> angle(run.samples * kDriveLanes);
+  detail::AlignedVector<double> joint(run.samples * kDriveLanes);
+  detail::AlignedVector<double> torque(run.samples * kDriveLanes);
+  roll_out(log, run, lanes, options, {angle.data(), joint.data(), torque.data()});
+  Rolled one;
+  for (std::size_t n = lane; n < angle.size(); n += kDriveLanes) {
+    one.angle_rad.push_back(angle[n]);
+    one.joint_angle_rad.push_back(joint[n]);
+    one.joint_torque_Nm.push_back(torque[n]);
+  }
+  return one;
+}
+
 std::vector<double> kernel_angles(const DriveLog& log, const DriveValues& values,
-                                  const DriveTerms& terms, std::size_t lane) {
+                                  const DriveTerms& terms, std::size_t lane,
+                                  DriveIntegrator integrator = DriveIntegrator::midpoint_speed,
+                                  double step_s = 0.001) {
   DriveLanes lanes{};
   for (std::size_t k = 0; k < kDriveLanes; ++k) {
     DriveValues other = values;
     at(other, coulomb) *= k == lane ? 1.0 : 1.5;
     lanes.set(k, other);
   }
-  std::vector<double> all(log.size() * kDriveLanes + 8);
-  double* aligned = all.data();
-  while (reinterpret_cast<std::uintptr_t>(aligned) % 64 != 0) ++aligned;
-  roll_out(log, {.first = 0, .samples = log.size(), .angle_rad = 0.1}, lanes, {terms, 0.001},
-           {.angle_rad = aligned});
-  std::vector<double> one;
-  for (std::size_t n = 0; n < log.size(); ++n) one.push_back(aligned[n * kDriveLanes + lane]);
-  return one;
+  return rolled(log, {.first = 0, .samples = log.size(), .angle_rad = 0.1}, lanes,
+                {terms, step_s, integrator}, lane)
+      .angle_rad;
+}
+
+DriveTerms terms_of_one_mass() {
+  DriveTerms terms = DriveTerms().set();
+  for (const DriveTerm term : {DriveTerm::spring, DriveTerm::hysteresis, DriveTerm::backlash,
+                               DriveTerm::bearing, DriveTerm::presliding, DriveTerm::joint_inertia})
+    terms.reset(static_cast<std::size_t>(term));
+  return terms;
 }
 
 TEST(DriveRollouts, AreThoseOfTheEquationsInEachLane) {
   const DriveLog log = test_log(CommandKind::goal_to_duty);
   const std::vector<double> wanted = one_mass(log, test_values(), 0.1);
-  DriveTerms terms = DriveTerms().set();
-  for (const DriveTerm term : {DriveTerm::spring, DriveTerm::hysteresis, DriveTerm::backlash,
-                               DriveTerm::bearing, DriveTerm::presliding, DriveTerm::joint_inertia})
-    terms.reset(static_cast<std::size_t>(term));
   for (const std::size_t lane : {std::size_t{0}, std::size_t{7}, kDriveLanes - 1}) {
-    const std::vector<double> found = kernel_angles(log, test_values(), terms, lane);
+    const std::vector<double> found = kernel_angles(log, test_values(), terms_of_one_mass(), lane,
+                                                    DriveIntegrator::semi_implicit_euler);
     for (std::size_t n = 0; n < log.size(); ++n) ASSERT_NEAR(found[n], wanted[n], 1e-9) << n;
   }
+}
+
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double largest = 0.0;
+  for (std::size_t n = 0; n < a.size(); ++n) largest = std::max(largest, std::abs(a[n] - b[n]));
+  return largest;
+}
+
+// With dry friction the ends of motions are of first order with any fixed step.
+TEST(DriveRollouts, OfLongStepsAreNearThoseOfShortSteps) {
+  using enum DriveIntegrator;
+  DriveLog log = test_log(CommandKind::goal_to_duty);
+  const DriveTerms terms = drive_terms(
+      {DriveTerm::base, DriveTerm::delay, DriveTerm::resistance_rise, DriveTerm::duty_exponent});
+  DriveValues values = test_values();
+  at(values, coulomb) = 0.05;
+  const auto angles = [&](DriveIntegrator integrator, double step_s) {
+    return kernel_angles(log, values, terms, 0, integrator, step_s);
+  };
+  const std::vector<double> exact = angles(midpoint_speed, 1e-5);
+  EXPECT_LT(largest_difference(angles(semi_implicit_euler, 1e-5), exact), 1e-4);
+  const double of_first_order = largest_difference(angles(semi_implicit_euler, 0.0025), exact);
+  const double of_second_order = largest_difference(angles(midpoint_speed, 0.0025), exact);
+  EXPECT_LT(of_second_order, 0.2 * of_first_order);
+}
+
+TEST(DriveRollouts, BeginWithTheTorqueOfADelayedLaw) {
+  DriveLog log = test_log(CommandKind::goal_to_torque);
+  log.command.assign(log.size(), 0.6);
+  log.gain = 1.0;
+  log.speed_gain = 0.0;
+  log.load.load = {.gravity_Nm = 0.0, .inertia_kg_m2 = 100.0, .zero_rad = 0.0};
+  DriveValues values = neutral_drive_values();
+  at(values, armature) = 1.0;
+  at(values, delay) = 0.03;
+  const DriveLanes lanes = DriveLanes::all(values);
+  const Rolled found = rolled(log, {.first = 0, .samples = 5}, lanes,
+                              {drive_terms({DriveTerm::base, DriveTerm::delay}), 0.001});
+  EXPECT_DOUBLE_EQ(found.joint_torque_Nm.front(), 0.6);
+  EXPECT_NEAR(found.angle_rad[4], 0.5 * 0.6 / 101.0 * 0.02 * 0.02, 1e-8);
+}
+
+TEST(DriveRollouts, DelayALawByManyShortSteps) {
+  DriveLog law = test_log(CommandKind::goal_to_torque);
+  law.sample_period_s = 0.0001;
+  law.enabled.clear();
+  law.gain = 1.0;
+  law.speed_gain = 0.0;
+  law.load.load = {.gravity_Nm = 0.0, .inertia_kg_m2 = 1e6, .zero_rad = 0.0};  // hardly moves
+  DriveLog torque = law;
+  torque.kind = CommandKind::torque;
+  DriveValues values = neutral_drive_values();
+  at(values, armature) = 1.0;
+  at(values, delay) = 0.03;
+  const RolloutOptions options{drive_terms({DriveTerm::base, DriveTerm::delay}), 0.0001};
+  const DriveRun run{.first = 0, .samples = law.size()};
+  const DriveLanes lanes = DriveLanes::all(values);
+  EXPECT_LT(largest_difference(rolled(law, run, lanes, options).joint_torque_Nm,
+                               rolled(torque, run, lanes, options).joint_torque_Nm),
+            1e-6);
+}
+
+TEST(DriveRollouts, HaveNoTorqueWithoutDuty) {
+  DriveLog log = test_log(CommandKind::duty);
+  log.command.assign(log.size(), 0.0);
+  log.load.load.gravity_Nm = 0.0;
+  DriveValues values = test_values();
+  at(values, coulomb) = 0.0;
+  at(values, duty_exponent) = 0.3;
+  const Rolled found = rolled(log, {.first = 0, .samples = log.size()}, DriveLanes::all(values),
+                              {drive_terms({DriveTerm::base, DriveTerm::duty_exponent}), 0.001});
+  EXPECT_EQ(found.angle_rad.back(), 0.0);
+}
+
+TEST(DriveRollouts, HaveNoTorqueInTheBacklash) {
+  DriveLog log = test_log(CommandKind::torque);
+  log.command.assign(log.size(), 0.0);
+  log.load.load.gravity_Nm = 0.0;
+  DriveValues values = neutral_drive_values();
+  at(values, armature) = 0.1;
+  at(values, stiffness) = 300.0;
+  at(values, spring_damping) = 5.0;
+  at(values, hysteresis) = 2.0;
+  at(values, hysteresis_width) = 0.01;
+  at(values, backlash) = 0.05;
+  const Rolled found = rolled(log, {.first = 0, .samples = 100}, DriveLanes::all(values),
+                              {drive_terms({DriveTerm::base, DriveTerm::spring,
+                                            DriveTerm::hysteresis, DriveTerm::backlash}),
+                               0.001});
+  EXPECT_EQ(found.joint_torque_Nm.back(), 0.0);
+  // The motor moves, the joint does not until the backlash is passed.
+  log.command.assign(log.size(), 0.4);
+  const Rolled moved = rolled(log, {.first = 0, .samples = 100}, DriveLanes::all(values),
+                              {drive_terms({DriveTerm::base, DriveTerm::spring,
+                                            DriveTerm::hysteresis, DriveTerm::backlash}),
+                               0.001});
+  for (std::size_t n = 0; n < 100 && moved.angle_rad[n] < 0.05; ++n) {
+    EXPECT_EQ(moved.joint_torque_Nm[n], 0.0) << n;
+    EXPECT_EQ(moved.joint_angle_rad[n], 0.0) << n;
+  }
+  EXPECT_GT(moved.joint_torque_Nm.back(), 0.0);
+}
+
+TEST(DriveRollouts, BeginWithAJointThatHangsOnASoftSpring) {
+  DriveLog log = test_log(CommandKind::torque);
+  log.load.load = {.gravity_Nm = 8.0, .inertia_kg_m2 = 0.3, .zero_rad = 0.2};
+  DriveLanes lanes{};
+  for (std::size_t lane = 0; lane < kDriveLanes; ++lane) {
+    DriveValues values = neutral_drive_values();
+    at(values, armature) = 0.1;
+    at(values, stiffness) = 2.0 + 2.0 * static_cast<double>(lane);  // softer than gravity at first
+    lanes.set(lane, values);
+  }
+  for (const double angle : {0.3, 1.5, 3.0, -2.5})
+    for (std::size_t lane = 0; lane < kDriveLanes; ++lane) {
+      const Rolled found = rolled(log, {.first = 0, .samples = 2, .angle_rad = angle}, lanes,
+                                  {drive_terms({DriveTerm::base, DriveTerm::spring}), 0.001}, lane);
+      const double joint = found.joint_angle_rad.front();
+      const double stiffness_Nm_rad = 2.0 + 2.0 * static_cast<double>(lane);
+      EXPECT_NEAR(joint + 8.0 / stiffness_Nm_rad * std::sin(joint + 0.2), angle, 1e-9) << lane;
+    }
 }
 
 TEST(DriveRollouts, KeepTheEnergyOfAnElasticPendulumWithoutFriction) {
@@ -136,16 +282,12 @@ TEST(DriveRollouts, KeepTheEnergyOfAnElasticPendulumWithoutFriction) {
   log.load.load.zero_rad = 0.0;
   log.load.load.gravity_Nm = 0.0;
   const DriveTerms terms = drive_terms({DriveTerm::base, DriveTerm::spring});
-  DriveLanes lanes{};
-  for (std::size_t k = 0; k < kDriveLanes; ++k) lanes.set(k, values);
-  std::vector<double> motor(log.size() * kDriveLanes + 8);
-  double* aligned = motor.data();
-  while (reinterpret_cast<std::uintptr_t>(aligned) % 64 != 0) ++aligned;
   // Without gravity both masses move on at the speed that they had.
-  roll_out(log, {.first = 0, .samples = log.size(), .angle_rad = 0.0, .speed_rad_s = 1.0}, lanes,
-           {terms, 0.001}, {.angle_rad = aligned});
+  const Rolled found =
+      rolled(log, {.first = 0, .samples = log.size(), .angle_rad = 0.0, .speed_rad_s = 1.0},
+             DriveLanes::all(values), {terms, 0.001});
   const double duration = log.sample_period_s * static_cast<double>(log.size() - 1);
-  EXPECT_NEAR(aligned[(log.size() - 1) * kDriveLanes], duration, 1e-9);
+  EXPECT_NEAR(found.angle_rad.back(), duration, 1e-9);
 }
 
 TEST(DriveRollouts, OfTwoMassesHaveTheResonanceOfTheSpring) {
@@ -159,19 +301,15 @@ TEST(DriveRollouts, OfTwoMassesHaveTheResonanceOfTheSpring) {
   DriveValues values = neutral_drive_values();
   at(values, armature) = 0.1;
   at(values, stiffness) = 300.0;
-  DriveLanes lanes{};
-  for (std::size_t k = 0; k < kDriveLanes; ++k) lanes.set(k, values);
-  std::vector<double> torque(log.size() * kDriveLanes + 8);
-  double* aligned = torque.data();
-  while (reinterpret_cast<std::uintptr_t>(aligned) % 64 != 0) ++aligned;
-  roll_out(log, {.first = 0, .samples = log.size()}, lanes,
-           {drive_terms({DriveTerm::base, DriveTerm::spring}), 0.001},
-           {.joint_torque_Nm = aligned});
+  const std::vector<double> torque =
+      rolled(log, {.first = 0, .samples = log.size()}, DriveLanes::all(values),
+             {drive_terms({DriveTerm::base, DriveTerm::spring}), 0.001})
+          .joint_torque_Nm;
   int crossings = 0;
   std::size_t first = 0;
   std::size_t last = 0;
   for (std::size_t n = 100; n + 1 < log.size(); ++n)
-    if (aligned[n * kDriveLanes] < 0.0 && aligned[(n + 1) * kDriveLanes] >= 0.0) {
+    if (torque[n] < 0.0 && torque[n + 1] >= 0.0) {
       if (crossings++ == 0) first = n;
       last = n;
     }
@@ -190,7 +328,6 @@ TEST(DriveRollouts, OfALawDelayItsTorque) {
   EXPECT_EQ(kernel_angles(log, values, with, 0), kernel_angles(log, values, without, 0));
   at(values, delay) = 0.01;
   const std::vector<double> late = kernel_angles(log, values, with, 0);
-  // Ten steps of a millisecond pass before the first torque of the law acts.
   const std::vector<double> now = kernel_angles(log, values, without, 0);
   EXPECT_NE(late, now);
   for (const double angle : late) EXPECT_TRUE(std::isfinite(angle));

@@ -17,8 +17,7 @@ namespace torsio {
 /// One mass (no spring), q the joint's angle, v = q':
 ///
 ///     (inertia + armature + joint_inertia) q'' = tau_m + tau_e - tau_f
-///     duty       d  = sgn(d) |d|^duty_exponent
-///     current    i  = (supply d - kt v) / (R + resistance_rise d^2)
+///     current    i  = (supply sgn(d) |d|^duty_exponent - kt v) / (R + resistance_rise d^2), d the duty
 ///     motor   tau_m = kt i; 0 while the power is off and the winding open
 ///             with `speed_limit`, of a law that commands torque: at most stall_torque (1 - v / no_load_speed) forwards,
 ///             stall_torque (1 + v / no_load_speed) backwards
@@ -27,7 +26,8 @@ namespace torsio {
 ///                         + stribeck exp(-|v| / stribeck_speed) + viscous |v|
 ///     load        L = |tau_m (1 + direction) - tau_e (1 - direction)|
 ///
-/// Two masses, th the motor's angle after the gear, x = th - q less the backlash on both sides:
+/// Two masses, th the motor's angle after the gear, x = th - q less the backlash on both sides, within which x and x'
+/// are 0:
 ///
 ///     armature th'' = tau_m - tau_f - tau_s, L = |tau_s|
 ///     (inertia + joint_inertia) q'' = tau_s + tau_e - bearing (at most, as dry friction) - bearing_viscous v

@@ -44,7 +44,8 @@ struct IdentifyOptions {
 struct IdentifiedDriveParameter {
   DriveParameter parameter{};
   double value = 0.0;
-  /// Delete-one-recording jackknife, and the load's errors, in quadrature; NaN: fewer than three recordings.
+  /// Delete-one-recording jackknife, the load's errors and that of a measured error gain, in quadrature; NaN: fewer than
+  /// three recordings.
   double standard_error = kNotMeasured;
   double lowest =
       kNotMeasured;  ///< end of the 95 % interval: Student's t, on the logarithm of a positive parameter
@@ -76,7 +77,9 @@ struct DriveRecordingScore {
 /// Duty over gain and error where it is not limited, by least squares.
 struct MeasuredErrorGain {
   double value_1_rad = 0.0;
-  double residual_duty_1 = 0.0;  ///< RMS
+  double standard_error_1_rad = kNotMeasured;  ///< delete-one-recording jackknife; NaN: of one
+  double delay_s = 0.0;                        ///< after which the drive follows a goal
+  double residual_duty_1 = 0.0;                ///< RMS
   std::size_t samples = 0;
 };
 
