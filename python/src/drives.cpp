@@ -98,22 +98,24 @@ py::dict simulate_recording(const IdentifiedDrive& self, const Recording& record
 }
 
 IdentifiedDrive evaluated(const IdentifiedDrive& self, const py::object& items,
-                          const py::object& load) {
+                          const py::object& load, const std::string& group_by) {
   DriveIdentification drive = *self.drive;
   if (!load.is_none()) drive.load = load_sheet_of(load);
   const std::vector<Recording> recordings = recordings_from(items);
   return interruptible([&](const Progress& /*progress*/) {
     return IdentifiedDrive{
-        std::make_shared<const DriveIdentification>(evaluate_drive(drive, recordings))};
+        std::make_shared<const DriveIdentification>(evaluate_drive(drive, recordings, group_by))};
   });
 }
 
 double write_for(const IdentifiedDrive& self, const std::string& target, const py::object& path,
-                 const py::object& items, const std::string& name, std::size_t starts) {
+                 const py::object& items, const std::string& name, const std::string& group_by,
+                 std::size_t starts) {
   const DriveTarget wanted = drive_target(target);
+  require_writable(wanted, self.drive->drive.law, name);
   const std::vector<Recording> recordings = recordings_from(items);
   const WrittenDrive written = interruptible([&](const Progress& progress) {
-    const DriveIdentification here = evaluate_drive(*self.drive, recordings);
+    const DriveIdentification here = evaluate_drive(*self.drive, recordings, group_by);
     return write_drive(wanted, here, recordings, name, {.starts = starts, .progress = progress});
   });
   write_all(path, written.text);
@@ -134,9 +136,9 @@ void bind_drives(py::module_& module) {
                                             : identification_text(*self.drive);
            })
       .def("simulate", simulate_recording, py::arg("recording"))
-      .def("evaluate", evaluated, py::arg("recordings"), py::arg("load"))
+      .def("evaluate", evaluated, py::arg("recordings"), py::arg("load"), py::arg("group_by"))
       .def("write", write_for, py::arg("target"), py::arg("path"), py::arg("recordings"),
-           py::arg("name"), py::arg("starts"))
+           py::arg("name"), py::arg("group_by"), py::arg("starts"))
       .def("save", [](const IdentifiedDrive& self, const py::object& path) {
         write_all(path, identification_json(*self.drive, self.advice));
       });

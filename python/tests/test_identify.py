@@ -77,6 +77,8 @@ def test_a_file_for_another_program_is_written(identified, tmp_path):
     assert f"{error_rad:.5f} rad" in path.read_text()
     with pytest.raises(torsio.UsageError, match="bam, mjcf or isaaclab"):
         identified.write("gazebo", path)
+    with pytest.raises(torsio.UsageError, match="kp_1"):
+        identified.write("mjcf", path, group_by="kp_1")
 
 
 def test_mistakes_are_named(chirps, load_file, tmp_path):

@@ -37,9 +37,12 @@ class DriveParameter:
 class IdentifiedDrive:
     """What `identify` found, or what `read_drive` read. Never changed."""
 
-    def __init__(self, core: _core.IdentifiedDrive, recordings: Recordings | None = None) -> None:
+    def __init__(
+        self, core: _core.IdentifiedDrive, recordings: Recordings | None = None, group_by: str = ""
+    ) -> None:
         self._core = core
         self._recordings = recordings
+        self._group_by = group_by
         self._document = _document(core.document_json())
 
     @property
@@ -104,13 +107,19 @@ class IdentifiedDrive:
         return self._core.simulate(recording)
 
     def evaluate(
-        self, recordings: Recordings, *, load: Load | str | PathLike[str] | None = None
+        self,
+        recordings: Recordings,
+        *,
+        load: Load | str | PathLike[str] | None = None,
+        group_by: str = "",
     ) -> IdentifiedDrive:
         """The same drive with the errors of its free runs through other recordings; nothing is fitted.
 
         load: that of these recordings, if it is another one (docs/use/known_load.md).
+        group_by: as in `identify`, for a later `write`.
         """
-        return IdentifiedDrive(self._core.evaluate(recordings, load), recordings)
+        core = self._core.evaluate(recordings, load, group_by)
+        return IdentifiedDrive(core, recordings, group_by)
 
     def write(
         self,
@@ -119,17 +128,20 @@ class IdentifiedDrive:
         *,
         recordings: Recordings | None = None,
         name: str = "servo",
+        group_by: str | None = None,
         starts: int = 3,
     ) -> float:
         """Writes the drive for another program, refitted in its equations; returns the error there in rad.
 
         target: bam, mjcf or isaaclab.
         recordings: to which it is fitted; without them those of `identify` or `evaluate`.
+        group_by: as in `identify`, by default as there: what bam's model is chosen by.
         """
+        groups = self._group_by if group_by is None else group_by
         used = self._recordings if recordings is None else recordings
         if used is None:
             raise UsageError("write: a drive that was read from a file needs recordings=, to which it is refitted")
-        return self._core.write(target, path, used, name, starts)
+        return self._core.write(target, path, used, name, groups, starts)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes a file for `read_drive` and `torsio identify --from`."""
@@ -187,7 +199,7 @@ def identify(
     core = _core.identify(
         recordings, load, drive, chosen, spring, group_by, starts, seed, standard_errors, nested
     )
-    return IdentifiedDrive(core, recordings)
+    return IdentifiedDrive(core, recordings, group_by)
 
 
 def read_drive(path: str | PathLike[str]) -> IdentifiedDrive:

@@ -51,6 +51,17 @@ TEST_F(IdentifyProgram, RefusesOptionsThatHaveNoEffectOnADriveFromAFile) {
   EXPECT_EQ(torsio("identify air1.csv").exit_code, kCallWasWrong);
 }
 
+TEST_F(IdentifyProgram, RefusesAFileThatItCannotWriteBeforeTheFit) {
+  record(1);
+  for (const char* const more :
+       {"--write bam servo.json", "--write mjcf a.xml --name 2go", "--spring --terms delay"}) {
+    const Outcome outcome =
+        torsio(std::string("identify air1.csv --load load.yaml --starts 100 ") + more);
+    EXPECT_EQ(outcome.exit_code, kCallWasWrong) << more;
+    EXPECT_EQ(outcome.out, "") << more;
+  }
+}
+
 TEST_F(IdentifyProgram, RefusesALawThatTheValuesAreNotOf) {
   record(2);
   ASSERT_EQ(torsio("identify air1.csv air2.csv --load load.yaml --terms load_friction --starts 1 "

@@ -106,13 +106,20 @@ void check_call(DriveIdentifyFlags& flags) {
                      "scale, or --from servo.json, a drive that was identified",
          .found = flags.data.recordings.empty() ? "no recordings" : "no --load",
          .advice = "Example: torsio identify logs/*.json.gz --load pendulum.yaml -o servo.json"});
+  if (flags.has_spring && flags.terms != "auto")
+    throw torsio::UsageError(
+        {.place = "--spring",
+         .expected = "--terms auto, whose choice then begins with the terms of a spring",
+         .found = "--terms " + flags.terms,
+         .advice = "Name the terms: --terms spring,hysteresis,.. without --spring."});
   std::vector<std::string> inputs;
   for (const std::string& file : {flags.from, flags.load, flags.drive})
     if (!file.empty()) inputs.push_back(file);
   std::vector<std::string> outputs{flags.output, flags.json.destination, flags.report.destination,
                                    flags.report.plot};
   for (const auto& [target, file] : flags.written) {
-    (void)torsio::drive_target(target);
+    // The law is looked at when it is known.
+    torsio::require_writable(torsio::drive_target(target), torsio::DriveLaw::position, flags.name);
     outputs.push_back(file);
   }
   flags.data.check_outputs(outputs, inputs);
@@ -124,6 +131,11 @@ torsio::DriveSheet drive_of(const DriveIdentifyFlags& flags, const torsio::Recor
   remark("note: no --drive; the channels suggest the law '" + std::string(torsio::name(drive.law)) +
          "'");
   return drive;
+}
+
+void require_writable(const DriveIdentifyFlags& flags, torsio::DriveLaw law) {
+  for (const auto& [target, file] : flags.written)
+    torsio::require_writable(torsio::drive_target(target), law, flags.name);
 }
 
 /// The drive of `--from` with the errors of these recordings; another load or law replaces that of the file.
@@ -143,7 +155,17 @@ torsio::DriveIdentification evaluated_drive(const DriveIdentifyFlags& flags,
            .found = std::string(torsio::name(identified.drive.law))});
     if (!identified.drive.error_gain_1_rad) identified.drive.error_gain_1_rad = error_gain_1_rad;
   }
+  require_writable(flags, identified.drive.law);
   return torsio::evaluate_drive(identified, recordings, flags.group_by);
+}
+
+torsio::DriveIdentification identified_drive(const DriveIdentifyFlags& flags,
+                                             const torsio::LoadSheet& load,
+                                             const std::vector<torsio::Recording>& recordings,
+                                             const torsio::IdentifyOptions& options) {
+  const torsio::DriveSheet drive = drive_of(flags, recordings.front());
+  require_writable(flags, drive.law);
+  return torsio::identify_drive(recordings, load, drive, options);
 }
 
 void write_files(const DriveIdentifyFlags& flags, const torsio::DriveIdentification& identified,
@@ -169,9 +191,8 @@ void run(DriveIdentifyFlags& flags) {
   const std::vector<torsio::Recording> recordings = recordings_of(flags, progress.listener());
   const torsio::IdentifyOptions options = options_of(flags, progress.listener());
   const torsio::DriveIdentification identified =
-      is_evaluation
-          ? evaluated_drive(flags, recordings)
-          : torsio::identify_drive(recordings, *load, drive_of(flags, recordings.front()), options);
+      is_evaluation ? evaluated_drive(flags, recordings)
+                    : identified_drive(flags, *load, recordings, options);
   std::vector<torsio::DriveAdvice> advice;
   if (!is_evaluation) advice = torsio::advise_drive(identified, recordings);
   if (flags.json.wants_tables())
@@ -193,6 +214,43 @@ void exclude_from(CLI::App& verb, CLI::Option& from) {
     from.excludes(verb.get_option(option));
 }
 
+void add_fit_options(CLI::App& verb, DriveIdentifyFlags& flags) {
+  verb.add_option("--terms", flags.terms,
+                  "terms of the model beyond the base, separated by commas; auto: chosen by "
+                  "leaving out recordings")
+      ->capture_default_str();
+  verb.add_flag("--spring", flags.has_spring,
+                "with --terms auto: begin with a second mass and its spring, hysteresis, backlash "
+                "and bearing");
+  verb.add_option("--group-by", flags.group_by,
+                  "condition whose equal values are left out together, or 'recording' (default: "
+                  "by the number of recordings)");
+  verb.add_option("--starts", flags.starts, "starts of each search")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
+  verb.add_option("--step", flags.step,
+                  "longest step of the integrator (default: 2.5ms; with a spring 1ms)");
+  verb.add_option("--threads", flags.threads,
+                  "threads; the result does not depend on it (default: all)")
+      ->check(CLI::Range(0, 1024));
+  verb.add_flag("--no-standard-errors", flags.without_errors,
+                "skip the fits without one recording each");
+  verb.add_flag("--no-nested", flags.without_nested,
+                "skip the choice of the terms without each group");
+  add_seed(verb, flags.seed, "seed of the starts");
+}
+
+void add_output_options(CLI::App& verb, DriveIdentifyFlags& flags) {
+  verb.add_option("-o,--output", flags.output,
+                  "file of the identified drive (JSON), for --from; untouched unless the work "
+                  "succeeds");
+  verb.add_option("--write", flags.written,
+                  "TARGET FILE: the drive for another program, bam, mjcf or isaaclab, refitted "
+                  "with its step; repeatable")
+      ->type_name("TARGET FILE");
+  verb.add_option("--name", flags.name, "of the actuator in these files")->capture_default_str();
+}
+
 }  // namespace
 
 void add_identify(CLI::App& app) {
@@ -212,37 +270,8 @@ void add_identify(CLI::App& app) {
       "--load and --drive replace what it states");
   verb->add_option("--load", flags->load, "file of the known load (docs/use/known_load.md)");
   verb->add_option("--drive", flags->drive, "file of the drive's law; default: by the channels");
-  verb->add_option("--terms", flags->terms,
-                   "terms of the model beyond the base, separated by commas; auto: chosen by "
-                   "leaving out recordings")
-      ->capture_default_str();
-  verb->add_flag("--spring", flags->has_spring,
-                 "with --terms auto: begin with a second mass and its spring, hysteresis, backlash "
-                 "and bearing");
-  verb->add_option("--group-by", flags->group_by,
-                   "condition whose equal values are left out together, or 'recording' (default: "
-                   "by the number of recordings)");
-  verb->add_option("--starts", flags->starts, "starts of each search")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 100));
-  verb->add_option("--step", flags->step,
-                   "longest step of the integrator (default: 2.5ms; with a spring 1ms)");
-  verb->add_option("--threads", flags->threads,
-                   "threads; the result does not depend on it (default: all)")
-      ->check(CLI::Range(0, 1024));
-  verb->add_flag("--no-standard-errors", flags->without_errors,
-                 "skip the fits without one recording each");
-  verb->add_flag("--no-nested", flags->without_nested,
-                 "skip the choice of the terms without each group");
-  add_seed(*verb, flags->seed, "seed of the starts");
-  verb->add_option("-o,--output", flags->output,
-                   "file of the identified drive (JSON), for --from; untouched unless the work "
-                   "succeeds");
-  verb->add_option("--write", flags->written,
-                   "TARGET FILE: the drive for another program, bam, mjcf or isaaclab, refitted "
-                   "with its step; repeatable")
-      ->type_name("TARGET FILE");
-  verb->add_option("--name", flags->name, "of the actuator in these files")->capture_default_str();
+  add_fit_options(*verb, *flags);
+  add_output_options(*verb, *flags);
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
   flags->report.add(*verb, "Mean |error");

@@ -29,7 +29,8 @@ constexpr double kLongestStep_s = 0.1;
 DriveFileJson values_json(const DriveValues& values) {
   DriveFileJson document = DriveFileJson::object();
   for (const DriveParameterInfo& info : drive_parameters())
-    document[std::string(info.name)] = at(values, info.parameter);
+    if (at(values, info.parameter) != info.neutral)
+      document[std::string(info.name)] = at(values, info.parameter);
   return document;
 }
 
@@ -113,22 +114,36 @@ DriveParameter parameter_from(const std::string& text, const std::string& place)
   refuse_drive_name(place, "a parameter", text, known);
 }
 
-/// A value that is not in the file is that of a term which an earlier release did not have: neutral.
+/// Whether the equations divide by the value. An armature of 0 has no inertia of its own beside a spring.
+bool divides(const DriveParameterInfo& info, const DriveTerms& terms) {
+  using enum DriveParameter;
+  const bool is_used = has(terms, info.term);
+  switch (info.parameter) {
+    case armature: return has(terms, DriveTerm::spring);
+    case stiffness:
+    case presliding: return is_used;
+    default: return info.is_positive && info.neutral > 0.0;
+  }
+}
+
+/// A value that is not in the file is neutral: its term is not used, or an earlier release did not have it.
 DriveValues values_from(const JsonObject& document, const DriveTerms& terms,
                         const std::string& place) {
   DriveValues values = neutral_drive_values();
-  for (const auto& [text, value] : document.number_map("values")) {
-    const std::string at_value = fmt::format("{}/values/{}", place, text);
-    const DriveParameter parameter = parameter_from(text, at_value);
-    const DriveParameterInfo& info = drive_parameter_info(parameter);
-    const bool is_searched = has(terms, info.term) && info.is_positive && value != info.neutral;
-    if (!std::isfinite(value) || (info.is_positive && value < 0.0) ||
-        (is_searched && !(value > 0.0)))
-      throw Error({.place = at_value,
-                   .expected = info.is_positive ? "a finite number above 0" : "a finite number",
-                   .found = fmt::format("{}", value),
-                   .advice = std::string(kDriveFileAdvice)});
-    at(values, parameter) = value;
+  for (const auto& [text, value] : document.number_map("values"))
+    at(values, parameter_from(text, fmt::format("{}/values/{}", place, text))) = value;
+  for (const DriveParameterInfo& info : drive_parameters()) {
+    const double value = at(values, info.parameter);
+    const bool must_be_positive = divides(info, terms);
+    if (std::isfinite(value) && !(info.is_positive && value < 0.0) &&
+        !(must_be_positive && value == 0.0))
+      continue;
+    throw Error({.place = fmt::format("{}/values/{}", place, info.name),
+                 .expected = must_be_positive   ? "a finite number above 0"
+                             : info.is_positive ? "a finite number, at least 0"
+                                                : "a finite number",
+                 .found = fmt::format("{}", value),
+                 .advice = std::string(kDriveFileAdvice)});
   }
   return values;
 }
@@ -179,6 +194,11 @@ void read_sheets(const nlohmann::json& parsed, const std::string& place,
                    .advice = std::string(kDriveFileAdvice)});
   identified.load = parse_load_sheet(parsed.at("load_file").dump(), place);
   identified.drive = parse_drive_sheet(parsed.at("drive_file").dump(), place);
+  if (identified.drive.law == DriveLaw::position && !identified.drive.error_gain_1_rad)
+    throw Error({.place = place + "/drive_file/error_gain",
+                 .expected = "the duty for an error of 1 rad at gain 1",
+                 .found = "none",
+                 .advice = std::string(kDriveFileAdvice)});
 }
 
 void require_drive_version(const JsonObject& document, const std::string& place) {

@@ -109,7 +109,7 @@ DriveValues typical_values(const DriveLogs& logs, const DriveTerms& terms) {
   at(all, presliding) = 1e-3;
   DriveValues values = neutral_drive_values();
   for (const DriveParameterInfo& info : drive_parameters())
-    if (has(terms, info.term))
+    if (is_searched(info, terms, logs.front()->kind))
       at(values, info.parameter) = std::clamp(at(all, info.parameter), info.lowest, info.highest);
   return values;
 }

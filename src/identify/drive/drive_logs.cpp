@@ -45,7 +45,12 @@ void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log)
     case DriveLaw::position:
       log.kind = CommandKind::goal_to_duty;
       log.supply_V = positive(drive.supply_V, "supply");
-      log.gain = positive(drive.gain, "gain") * drive.error_gain_1_rad.value();
+      if (!drive.error_gain_1_rad)
+        throw Error({.place = drive.file,
+                     .expected = "error_gain, the duty for an error of 1 rad at gain 1",
+                     .found = "none",
+                     .advice = "Identify the drive from recordings with duty_1, or state it."});
+      log.gain = positive(drive.gain, "gain") * *drive.error_gain_1_rad;
       log.limit = drive.max_duty_1;
       return;
     case DriveLaw::pd:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <numeric>
 
@@ -22,6 +23,14 @@ constexpr std::array<std::string_view, 3> kTargetNames{"bam", "mjcf", "isaaclab"
 
 std::vector<DriveLog> grouped_logs(const DriveIdentification& identified,
                                    const std::vector<Recording>& recordings) {
+  if (recordings.empty())
+    throw UsageError({.place = "write_drive", .expected = "recordings", .found = "none"});
+  if (!std::ranges::equal(recordings, identified.recordings, {}, &Recording::name,
+                          &DriveRecordingScore::recording))
+    throw UsageError({.place = "write_drive",
+                      .expected = "the recordings of the identified drive, in their order",
+                      .found = fmt::format("{} other recordings", recordings.size()),
+                      .advice = "Evaluate the drive on them first (evaluate_drive)."});
   std::vector<DriveLog> logs = drive_logs(recordings, identified.load, identified.drive);
   for (std::size_t k = 0; k < logs.size(); ++k) logs[k].group = identified.recordings[k].group;
   return logs;
@@ -38,6 +47,22 @@ DriveValues typical_bam() {
   return values;
 }
 
+bool has_passive_run(const std::vector<DriveLog>& logs) {
+  return std::ranges::any_of(logs, [](const DriveLog& log) {
+    return std::ranges::find(log.enabled, 0.0) != log.enabled.end();
+  });
+}
+
+void require_identifier(const std::string& name) {
+  const bool is_good = !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_';
+  }) && std::isdigit(static_cast<unsigned char>(name.front())) == 0;
+  if (!is_good)
+    throw UsageError({.place = "the actuator's name",
+                      .expected = "letters, digits and underscores, no digit first",
+                      .found = name});
+}
+
 double bam_held_out(const GroupedLogs& logs, BamModel model, const DriveFitOptions& options,
                     std::size_t threads) {
   std::vector<DriveSolution> fits(logs.groups);
@@ -51,12 +76,19 @@ double bam_held_out(const GroupedLogs& logs, BamModel model, const DriveFitOptio
   return mean;
 }
 
-void require_position(const DriveIdentification& identified) {
-  if (identified.drive.law == DriveLaw::position) return;
-  throw UsageError({.place = "--write bam",
-                    .expected = "a drive of the law 'position', the only one that BAM has",
-                    .found = std::string(name(identified.drive.law)),
-                    .advice = "Use --write mjcf."});
+/// The model with the least held-out error; without groups the one with all terms.
+BamModel best_bam_model(const GroupedLogs& logs, const DriveFitOptions& options,
+                        std::size_t threads) {
+  std::size_t best = kBamModels - 1;
+  double least = HUGE_VAL;
+  for (std::size_t m = 0; m < kBamModels && logs.groups > 1; ++m) {
+    const double error = bam_held_out(logs, static_cast<BamModel>(m), options, threads);
+    if (error < least) {
+      least = error;
+      best = m;
+    }
+  }
+  return static_cast<BamModel>(best);
 }
 
 std::vector<std::string> other_terms(const DriveTerms& terms, const DriveTerms& kept) {
@@ -72,19 +104,9 @@ std::string joined_terms(const std::vector<std::string>& names) {
 
 WrittenDrive write_bam(const DriveIdentification& identified, const std::vector<DriveLog>& logs,
                        const std::string& actuator, const IdentifyOptions& options) {
-  require_position(identified);
   const GroupedLogs all = grouped(pointers_to(logs));
   const DriveFitOptions fit = fit_options(options);
-  std::size_t best = kBamModels - 1;
-  double least = HUGE_VAL;
-  for (std::size_t m = 0; m < kBamModels && all.groups > 1; ++m) {
-    const double error = bam_held_out(all, static_cast<BamModel>(m), fit, options.threads);
-    if (error < least) {
-      least = error;
-      best = m;
-    }
-  }
-  const auto model = static_cast<BamModel>(best);
+  const BamModel model = best_bam_model(all, fit, options.threads);
   const DriveProblem problem = bam_problem(all.logs, model);
   const DriveSolution solution = fit_problem(problem, typical_bam(), fit);
   WrittenDrive written{
@@ -96,6 +118,8 @@ WrittenDrive write_bam(const DriveIdentification& identified, const std::vector<
           identified.terms,
           drive_terms({DriveTerm::base, DriveTerm::load_friction, DriveTerm::load_stribeck,
                        DriveTerm::stribeck, DriveTerm::direction}))};
+  if (identified.drive.brakes_when_off && has_passive_run(logs))
+    written.not_expressed.emplace_back("the shorted winding without power");
   written.text +=
       fmt::format("  \"model\": \"{}\",\n  \"actuator\": \"{}\",\n", written.model, actuator);
   for (const std::size_t row : bam_rows(model))
@@ -147,13 +171,6 @@ ServoGains servo_gains(const DriveLog& log, const DriveValues& values) {
   return {torque_for_duty * log.gain, kt * kt / resistance, torque_for_duty * log.limit};
 }
 
-void require_servo(DriveTarget target, const DriveLog& log) {
-  if (log.kind == CommandKind::goal_to_duty || log.kind == CommandKind::goal_to_torque) return;
-  throw UsageError({.place = fmt::format("--write {}", name(target)),
-                    .expected = "a drive of the law 'position' or 'pd'",
-                    .found = "a law whose command is not an angle"});
-}
-
 /// A body of the load's gravity and inertia: a mass on half the length that its inertia as a point would have.
 std::string load_body(const JointLoad& load, double zero_rad) {
   const double first_moment_kg_m = load.gravity_Nm / kLoadGravity_m_s2;
@@ -165,73 +182,118 @@ std::string load_body(const JointLoad& load, double zero_rad) {
       -arm_m * std::sin(zero_rad), -arm_m * std::cos(zero_rad), mass_kg, own, own, own);
 }
 
+/// A text within a comment of XML, where two hyphens may not follow each other.
+std::string in_comment(const std::string& text) {
+  std::string clean;
+  for (const char c : text) {
+    if (c == '-' && !clean.empty() && clean.back() == '-') clean += ' ';
+    clean += c;
+  }
+  return clean;
+}
+
+std::string mjcf_joint(const DriveLog& log, const Refitted& fit, const ServoGains& gains,
+                       const std::string& name) {
+  using enum DriveParameter;
+  const double back_emf_Nms_rad =
+      log.kind == CommandKind::goal_to_duty ? gains.damping_Nms_rad : 0.0;
+  return fmt::format(
+      "<joint name=\"{}\" type=\"hinge\" axis=\"0 1 0\" armature=\"{:.9g}\" damping=\"{:.9g}\" "
+      "frictionloss=\"{:.9g}\"/>",
+      name, at(fit.values, armature), at(fit.values, viscous) + back_emf_Nms_rad,
+      at(fit.values, coulomb));
+}
+
+/// What moves: the load on the motor's joint, or on a spring between them.
+std::string mjcf_body(const DriveLog& log, const Refitted& fit, const std::string& joint,
+                      const std::string& actuator) {
+  using enum DriveParameter;
+  JointLoad load = log.load.load;
+  load.inertia_kg_m2 += at(fit.values, joint_inertia);
+  const std::string inertial = load_body(load, load.zero_rad + at(fit.values, zero));
+  if (!has(fit.terms, DriveTerm::spring))
+    return fmt::format("      {}\n      {}\n", joint, inertial);
+  return fmt::format(
+      "      {}\n      <inertial pos=\"0 0 0\" mass=\"1e-6\" diaginertia=\"1e-9 1e-9 1e-9\"/>\n"
+      "      <body name=\"{}_load\">\n        <joint name=\"{}_spring\" type=\"hinge\" axis=\"0 1 "
+      "0\" "
+      "stiffness=\"{:.9g}\" damping=\"{:.9g}\"/>\n        {}\n      </body>\n",
+      joint, actuator, actuator, at(fit.values, stiffness), at(fit.values, spring_damping),
+      inertial);
+}
+
+constexpr double kNoLimit_Nm = 1e8;  // a sheet without a limit has a larger one
+
+std::string mjcf_actuator(const DriveLog& log, const ServoGains& gains, const std::string& joint,
+                          const std::string& actuator) {
+  const double law_damping_Nms_rad =
+      log.kind == CommandKind::goal_to_torque ? gains.damping_Nms_rad : 0.0;
+  const std::string limit = gains.limit_Nm < kNoLimit_Nm
+                                ? fmt::format(R"( forcelimited="true" forcerange="{:.9g} {:.9g}")",
+                                              -gains.limit_Nm, gains.limit_Nm)
+                                : std::string();
+  return fmt::format(
+      "<general name=\"{}\" joint=\"{}\" biastype=\"affine\" gainprm=\"{:.9g}\" "
+      "biasprm=\"0 {:.9g} {:.9g}\"{}/>",
+      actuator, joint, gains.stiffness_Nm_rad, -gains.stiffness_Nm_rad, -law_damping_Nms_rad,
+      limit);
+}
+
 WrittenDrive write_mjcf(const DriveIdentification& identified, const std::vector<DriveLog>& logs,
                         const std::string& actuator, const IdentifyOptions& options) {
-  using enum DriveParameter;
   const DriveLog& log = logs.front();
-  require_servo(DriveTarget::mjcf, log);
   // The hinge of the load turns against the motor, so that it cannot have the friction of the joint's bearing.
   const DriveTerms kept =
       drive_terms({DriveTerm::base, DriveTerm::spring, DriveTerm::joint_inertia});
   const Refitted fit = refitted(identified, logs, kept, 0.002, options);
   const ServoGains gains = servo_gains(log, fit.values);
-  const bool has_spring = has(fit.terms, DriveTerm::spring);
   WrittenDrive written{.text = {},
                        .mae_rad = fit.mae_rad,
                        .own_mae_rad = identified.mae_rad,
                        .model = {},
                        .not_expressed = other_terms(identified.terms, kept)};
-  const bool has_passive = std::ranges::any_of(logs, [](const DriveLog& one) {
-    return std::ranges::any_of(one.enabled, [](double on) { return on == 0.0; });
-  });
-  if (has_passive)
+  if (has_passive_run(logs) && !log.brakes_when_off)
     written.not_expressed.emplace_back("the open winding without power: damping remains");
   if (log.speed_filter_rad_s > 0.0)
     written.not_expressed.emplace_back("the low-pass of the law's speed");
-  JointLoad load = log.load.load;
-  load.inertia_kg_m2 += at(fit.values, joint_inertia);
-  const std::string inertial = load_body(load, load.zero_rad + at(fit.values, zero));
-  std::string& text = written.text;
-  text = fmt::format(
+  const std::string joint = actuator + (has(fit.terms, DriveTerm::spring) ? "_motor" : "_joint");
+  written.text = fmt::format(
       "<!-- Written by torsio identify for the load and the gain of {}. Refitted at this time "
-      "step: mean "
-      "|error| {:.5f} rad in "
-      "free runs, {:.5f} rad in torsio's equations.\n     Not expressed: {}. -->\n",
-      log.name, written.mae_rad, written.own_mae_rad, joined_terms(written.not_expressed));
-  text += fmt::format(
-      "<mujoco model=\"{}\">\n  <option timestep=\"{:.9g}\" integrator=\"Euler\" gravity=\"0 0 "
-      "-{}\"/>\n"
-      "  <worldbody>\n    <body name=\"{}_motor\">\n",
-      actuator, fit.step_s, kLoadGravity_m_s2, actuator);
-  const std::string motor_joint = fmt::format(
-      "<joint name=\"{}_{}\" type=\"hinge\" axis=\"0 1 0\" armature=\"{:.9g}\" damping=\"{:.9g}\" "
-      "frictionloss=\"{:.9g}\"/>",
-      actuator, has_spring ? "motor" : "joint", at(fit.values, armature),
-      at(fit.values, viscous) +
-          (log.kind == CommandKind::goal_to_duty ? gains.damping_Nms_rad : 0.0),
-      at(fit.values, coulomb));
-  if (has_spring) {
-    text += fmt::format(
-        "      {}\n      <inertial pos=\"0 0 0\" mass=\"1e-6\" diaginertia=\"1e-9 1e-9 1e-9\"/>\n"
-        "      <body name=\"{}_load\">\n        <joint name=\"{}_spring\" type=\"hinge\" axis=\"0 "
-        "1 0\" "
-        "stiffness=\"{:.9g}\" damping=\"{:.9g}\"/>\n        {}\n      </body>\n",
-        motor_joint, actuator, actuator, at(fit.values, stiffness), at(fit.values, spring_damping),
-        inertial);
-  } else {
-    text += fmt::format("      {}\n      {}\n", motor_joint, inertial);
-  }
-  const double law_damping = log.kind == CommandKind::goal_to_torque ? gains.damping_Nms_rad : 0.0;
-  text += fmt::format(
-      "    </body>\n  </worldbody>\n  <actuator>\n    <general name=\"{}\" joint=\"{}_{}\" "
-      "biastype=\"affine\" "
-      "gainprm=\"{:.9g}\" biasprm=\"0 {:.9g} {:.9g}\"{}/>\n  </actuator>\n</mujoco>\n",
-      actuator, actuator, has_spring ? "motor" : "joint", gains.stiffness_Nm_rad,
-      -gains.stiffness_Nm_rad, -law_damping,
-      gains.limit_Nm < 1e8 ? fmt::format(R"( forcelimited="true" forcerange="{:.9g} {:.9g}")",
-                                         -gains.limit_Nm, gains.limit_Nm)
-                           : std::string());
+      "step: mean |error| {:.5f} rad in free runs, {:.5f} rad in torsio's equations.\n"
+      "     Not expressed: {}. -->\n"
+      "<mujoco model=\"{}\">\n"
+      "  <option timestep=\"{:.9g}\" integrator=\"Euler\" gravity=\"0 0 -{}\"/>\n"
+      "  <worldbody>\n    <body name=\"{}_motor\">\n{}    </body>\n  </worldbody>\n"
+      "  <actuator>\n    {}\n  </actuator>\n</mujoco>\n",
+      in_comment(log.name), written.mae_rad, written.own_mae_rad,
+      joined_terms(written.not_expressed), actuator, fit.step_s, kLoadGravity_m_s2, actuator,
+      mjcf_body(log, fit, mjcf_joint(log, fit, gains, joint), actuator),
+      mjcf_actuator(log, gains, joint, actuator));
   return written;
+}
+
+/// A configuration of Isaac Lab and the lines that only it has.
+struct LabActuator {
+  std::string_view configuration;
+  std::string lines;
+};
+
+/// DCMotorCfg has the limit of the supply and needs its speed, DelayedPDActuatorCfg has the delay, and none has both.
+LabActuator lab_actuator(const DriveLog& log, const Refitted& fit, const ServoGains& gains) {
+  using enum DriveParameter;
+  const auto delay_steps =
+      static_cast<long>(std::lround(std::max(at(fit.values, delay), 0.0) / fit.step_s));
+  if (delay_steps > 0)
+    return {"DelayedPDActuatorCfg",
+            fmt::format("    min_delay={0},\n    max_delay={0},\n", delay_steps)};
+  if (has(fit.terms, DriveTerm::speed_limit))
+    return {"DCMotorCfg", fmt::format("    saturation_effort={:.9g},\n    velocity_limit={:.9g},\n",
+                                      at(fit.values, stall_torque), at(fit.values, no_load_speed))};
+  if (log.kind == CommandKind::goal_to_duty)
+    return {"DCMotorCfg", fmt::format("    saturation_effort={:.9g},\n    velocity_limit={:.9g},\n",
+                                      gains.limit_Nm,
+                                      log.supply_V * log.limit / at(fit.values, torque_constant))};
+  return {"IdealPDActuatorCfg", {}};
 }
 
 WrittenDrive write_isaaclab(const DriveIdentification& identified,
@@ -239,11 +301,9 @@ WrittenDrive write_isaaclab(const DriveIdentification& identified,
                             const IdentifyOptions& options) {
   using enum DriveParameter;
   const DriveLog& log = logs.front();
-  require_servo(DriveTarget::isaaclab, log);
-  // DCMotorCfg has the limit of the supply, DelayedPDActuatorCfg the delay, and none both.
-  const bool has_limit = has(identified.terms, DriveTerm::speed_limit);
-  const DriveTerms kept = has_limit ? drive_terms({DriveTerm::base, DriveTerm::speed_limit})
-                                    : drive_terms({DriveTerm::base, DriveTerm::delay});
+  const DriveTerms kept = has(identified.terms, DriveTerm::speed_limit)
+                              ? drive_terms({DriveTerm::base, DriveTerm::speed_limit})
+                              : drive_terms({DriveTerm::base, DriveTerm::delay});
   const Refitted fit = refitted(identified, logs, kept, 0.005, options);
   const ServoGains gains = servo_gains(log, fit.values);
   WrittenDrive written{.text = {},
@@ -251,45 +311,26 @@ WrittenDrive write_isaaclab(const DriveIdentification& identified,
                        .own_mae_rad = identified.mae_rad,
                        .model = {},
                        .not_expressed = other_terms(identified.terms, kept)};
-  const auto delay_steps =
-      static_cast<long>(std::lround(std::max(at(fit.values, delay), 0.0) / fit.step_s));
-  const bool is_delayed = delay_steps > 0;
-  const double kt = at(fit.values, torque_constant);
-  std::string& text = written.text;
-  text = fmt::format(
+  const LabActuator lab = lab_actuator(log, fit, gains);
+  if (has(fit.terms, DriveTerm::delay) && lab.configuration != "DelayedPDActuatorCfg")
+    written.not_expressed.emplace_back("delay, shorter than half a physics step");
+  if (log.speed_filter_rad_s > 0.0)
+    written.not_expressed.emplace_back("the low-pass of the law's speed");
+  const std::string effort = gains.limit_Nm < kNoLimit_Nm
+                                 ? fmt::format("    effort_limit={:.9g},\n", gains.limit_Nm)
+                                 : std::string();
+  written.text = fmt::format(
       "# Written by torsio identify; not run with Isaac Lab. Refitted at a physics step of {:.4g} "
-      "s: mean |error| "
-      "{:.5f} rad in free runs,\n# {:.5f} rad in torsio's equations. Not expressed: {}.\n",
-      fit.step_s, written.mae_rad, written.own_mae_rad, joined_terms(written.not_expressed));
-  text += fmt::format(
-      "from isaaclab.actuators import {0}\n\n{1} = {0}(\n    joint_names_expr=[\"{1}\"],\n",
-      is_delayed ? "DelayedPDActuatorCfg" : "DCMotorCfg", actuator);
-  if (is_delayed)
-    text += fmt::format("    min_delay={0},\n    max_delay={0},\n", delay_steps);
-  else
-    text += fmt::format("    saturation_effort={:.9g},\n",
-                        has_limit ? at(fit.values, stall_torque) : gains.limit_Nm);
-  text += fmt::format("    effort_limit={:.9g},\n", gains.limit_Nm);
-  if (log.kind == CommandKind::goal_to_duty)
-    text += fmt::format("    velocity_limit={:.9g},\n", log.supply_V * log.limit / kt);
-  else if (has_limit)
-    text += fmt::format("    velocity_limit={:.9g},\n", at(fit.values, no_load_speed));
-  text += fmt::format(
+      "s: mean |error| {:.5f} rad in free runs,\n"
+      "# {:.5f} rad in torsio's equations. Not expressed: {}.\n"
+      "from isaaclab.actuators import {}\n\n{} = {}(\n    joint_names_expr=[\"{}\"],\n{}{}"
       "    stiffness={:.9g},\n    damping={:.9g},\n    armature={:.9g},\n    friction={:.9g},\n"
       "    viscous_friction={:.9g},\n)\n",
+      fit.step_s, written.mae_rad, written.own_mae_rad, joined_terms(written.not_expressed),
+      lab.configuration, actuator, lab.configuration, actuator, lab.lines, effort,
       gains.stiffness_Nm_rad, gains.damping_Nms_rad, at(fit.values, armature),
       at(fit.values, coulomb), at(fit.values, viscous));
   return written;
-}
-
-void require_identifier(const std::string& name) {
-  const bool is_good = !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '_';
-  }) && std::isdigit(static_cast<unsigned char>(name.front())) == 0;
-  if (!is_good)
-    throw UsageError({.place = "--name",
-                      .expected = "letters, digits and underscores, no digit first",
-                      .found = name});
 }
 
 }  // namespace
@@ -303,10 +344,22 @@ DriveTarget drive_target(std::string_view text) {
       {.place = "--write", .expected = "bam, mjcf or isaaclab", .found = std::string(text)});
 }
 
+void require_writable(DriveTarget target, DriveLaw law, const std::string& name) {
+  require_identifier(name);
+  if (law == DriveLaw::position || (law == DriveLaw::pd && target != DriveTarget::bam)) return;
+  throw UsageError(
+      {.place = fmt::format("a file for {}", kTargetNames[static_cast<std::size_t>(target)]),
+       .expected = target == DriveTarget::bam
+                       ? "a drive of the law 'position', the only one that BAM has"
+                       : "a drive of the law 'position' or 'pd'",
+       .found = fmt::format("the law '{}'", torsio::name(law)),
+       .advice = law == DriveLaw::pd ? "Write it for mjcf." : ""});
+}
+
 WrittenDrive write_drive(DriveTarget target, const DriveIdentification& identified,
                          const std::vector<Recording>& recordings, const std::string& name,
                          const IdentifyOptions& options) {
-  require_identifier(name);
+  require_writable(target, identified.drive.law, name);
   const std::vector<DriveLog> logs = grouped_logs(identified, recordings);
   if (target == DriveTarget::bam) return write_bam(identified, logs, name, options);
   if (target == DriveTarget::mjcf) return write_mjcf(identified, logs, name, options);
@@ -316,7 +369,7 @@ WrittenDrive write_drive(DriveTarget target, const DriveIdentification& identifi
 std::vector<BamComparison> compare_with_bam(const DriveIdentification& identified,
                                             const std::vector<Recording>& recordings,
                                             const IdentifyOptions& options) {
-  require_position(identified);
+  require_writable(DriveTarget::bam, identified.drive.law, "servo");
   const std::vector<DriveLog> logs = grouped_logs(identified, recordings);
   const GroupedLogs all = grouped(pointers_to(logs));
   const DriveFitOptions fit = fit_options(options);

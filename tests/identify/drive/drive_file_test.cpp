@@ -133,7 +133,7 @@ TEST(DriveFile, NamesWhatIsWrongInIt) {
   EXPECT_THAT(refusal_of([](nlohmann::json& d) { d["values"]["delai_s"] = 0.0; }),
               HasSubstr("Did you mean 'delay_s'"));
   EXPECT_THAT(refusal_of([](nlohmann::json& d) { d["values"]["armature_kg_m2"] = -0.1; }),
-              HasSubstr("servo.json/values/armature_kg_m2: expected a finite number above 0"));
+              HasSubstr("servo.json/values/armature_kg_m2: expected a finite number, at least 0"));
   EXPECT_THAT(refusal_of([](nlohmann::json& d) { d["values"]["zero_rad"] = nullptr; }),
               HasSubstr("values/zero_rad: expected a finite number"));
   EXPECT_THAT(refusal_of([](nlohmann::json& d) { d["step_s"] = 0.0; }), HasSubstr("step_s"));
@@ -145,6 +145,60 @@ TEST(DriveFile, NamesWhatIsWrongInIt) {
               HasSubstr("position, pd"));
   EXPECT_THROW((void)parse_identified_drive("not JSON", "servo.json"), Error);
   EXPECT_THROW((void)evaluate_drive(one_servo(), {}), UsageError);
+}
+
+TEST(DriveFile, RefusesAZeroByWhichTheEquationsDivide) {
+  const auto zero_of = [](const char* parameter, const char* terms) {
+    return refusal_of([&](nlohmann::json& d) {
+      d["terms"] = terms;
+      d["values"][parameter] = 0.0;
+    });
+  };
+  for (const char* const parameter : {"resistance_ohm", "load_speed_rad_s", "stribeck_speed_rad_s",
+                                      "hysteresis_width_rad", "no_load_speed_rad_s"})
+    EXPECT_THAT(zero_of(parameter, "none"), HasSubstr("expected a finite number above 0"))
+        << parameter;
+  for (const char* const parameter : {"stiffness_Nm_rad", "armature_kg_m2"}) {
+    EXPECT_EQ(zero_of(parameter, "none"), "no error") << parameter;
+    const std::string refusal = refusal_of([&](nlohmann::json& d) {
+      d["terms"] = "spring";
+      d["values"]["stiffness_Nm_rad"] = 100.0;
+      d["values"][parameter] = 0.0;
+    });
+    EXPECT_THAT(refusal, HasSubstr(std::string(parameter) + ": expected a finite number above 0"));
+  }
+  EXPECT_THAT(zero_of("presliding_rad", "presliding"), HasSubstr("presliding_rad"));
+  // A value that is not in the file is neutral.
+  EXPECT_THAT(refusal_of([](nlohmann::json& d) { d["terms"] = "spring"; }),
+              HasSubstr("stiffness_Nm_rad"));
+}
+
+TEST(DriveFile, RefusesAPositionLawWithoutItsGain) {
+  for (const char* const gain : {"measured", ""}) {
+    const std::string refusal = refusal_of([&](nlohmann::json& d) {
+      d["drive_file"]["error_gain"] = gain;
+      if (*gain == '\0') d["drive_file"].erase("error_gain");
+    });
+    EXPECT_THAT(refusal, HasSubstr("drive_file/error_gain"));
+  }
+  DriveIdentification without = one_servo();
+  without.drive.error_gain_1_rad.reset();
+  EXPECT_THROW((void)evaluate_drive(without, servo_recordings({})), Error);
+}
+
+TEST(DriveFile, HasNoValueOfAWindingForALawOfTorque) {
+  const std::vector<Recording> recordings = servo_recordings({});
+  const LoadSheet load =
+      parse_load_sheet("load: {pendulum: {mass: 0.5kg, length: 0.1m}}", "load.yaml");
+  const DriveSheet law =
+      parse_drive_sheet("drive: {law: pd, kp: 1Nm_rad, kd: 0.1Nms_rad}", "drive.yaml");
+  const DriveIdentification found = identify_drive(
+      {recordings[0]}, load, law,
+      {.terms = drive_terms({DriveTerm::base}), .starts = 1, .has_standard_errors = false});
+  const nlohmann::json document = nlohmann::json::parse(identified_drive_text(found));
+  EXPECT_TRUE(document["values"].contains("coulomb_Nm"));
+  EXPECT_FALSE(document["values"].contains("torque_constant_Nm_A"));
+  EXPECT_FALSE(document["values"].contains("resistance_ohm"));
 }
 
 TEST(DriveFriction, FallsFromRestAndGrowsWithLoadAndSpeed) {

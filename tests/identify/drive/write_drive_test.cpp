@@ -117,5 +117,70 @@ TEST(WriteDrive, RefusesANameThatIsNoIdentifierAndALawWithoutAnAngle) {
   EXPECT_THROW((void)write_drive(DriveTarget::mjcf, other, servo.recordings, "servo"), UsageError);
 }
 
+TEST(WriteDrive, RefusesOtherRecordingsThanThoseOfTheDrive) {
+  const Identified servo = identified_servo();
+  EXPECT_THROW((void)write_drive(DriveTarget::mjcf, servo.drive, {}, "servo"), UsageError);
+  const std::vector<Recording> one{servo.recordings.back()};
+  EXPECT_THROW((void)write_drive(DriveTarget::mjcf, servo.drive, one, "servo"), UsageError);
+  EXPECT_THROW((void)compare_with_bam(servo.drive, {}), UsageError);
+  const DriveIdentification evaluated = evaluate_drive(servo.drive, one);
+  EXPECT_GT(write_drive(DriveTarget::mjcf, evaluated, one, "servo", {.starts = 1}).mae_rad, 0.0);
+  std::vector<Recording> more = servo.recordings;
+  more.push_back(more.front());
+  EXPECT_THROW((void)write_drive(DriveTarget::mjcf, servo.drive, more, "servo"), UsageError);
+}
+
+TEST(WriteDrive, HasNoTwoHyphensInACommentOfXml) {
+  const Identified servo = identified_servo();
+  std::vector<Recording> one{Recording("a--b ---> c", servo.recordings.front().sample_rate_Hz())};
+  for (const Channel& channel : servo.recordings.front().channels()) one.front().add(channel);
+  const DriveIdentification evaluated = evaluate_drive(servo.drive, one);
+  const std::string text =
+      write_drive(DriveTarget::mjcf, evaluated, one, "servo", {.starts = 1}).text;
+  const std::size_t end = text.find("-->");
+  EXPECT_EQ(text.find("--", 4), end);
+  EXPECT_EQ(text.compare(end, 12, "-->\n<mujoco "), 0);
+}
+
+/// A drive with the law of torque on a sine, as a servo follows it.
+Identified identified_pd(const DriveTerms& terms, double delay_s) {
+  Identified result;
+  DriveIdentification& drive = result.drive;
+  result.recordings = {servo_recordings({}).front()};
+  drive.load = parse_load_sheet("load: {pendulum: {mass: 0.5kg, length: 0.1m}}", "load.yaml");
+  drive.drive = parse_drive_sheet("drive: {law: pd, kp: 2Nm_rad, kd: 0.1Nms_rad}", "drive.yaml");
+  drive.terms = terms;
+  drive.values = neutral_drive_values();
+  at(drive.values, DriveParameter::armature) = 0.002;
+  at(drive.values, DriveParameter::coulomb) = 0.01;
+  at(drive.values, DriveParameter::delay) = delay_s;
+  drive.step_s = 0.0025;
+  // What it gives itself is what it is fitted to.
+  const DriveTrace trace = simulate_drive(drive, result.recordings.front());
+  Recording moved(result.recordings.front().name(), trace.sample_rate_Hz);
+  moved.add({.name = "goal_angle_rad",
+             .values = result.recordings.front().channel("goal_angle_rad").values});
+  moved.add({.name = "joint_angle_rad", .values = trace.angle_rad});
+  result.recordings = {moved};
+  drive = evaluate_drive(drive, result.recordings);
+  return result;
+}
+
+TEST(WriteDrive, GivesIsaacLabAnActuatorThatItsLawHas) {
+  const Identified plain = identified_pd(drive_terms({DriveTerm::base}), 0.0);
+  const WrittenDrive without =
+      write_drive(DriveTarget::isaaclab, plain.drive, plain.recordings, "servo", {.starts = 1});
+  EXPECT_THAT(without.text, HasSubstr("IdealPDActuatorCfg("));
+  // DCMotorCfg would need both, and the sheet has no limit.
+  EXPECT_THAT(without.text, ::testing::Not(HasSubstr("saturation_effort")));
+  EXPECT_THAT(without.text, ::testing::Not(HasSubstr("effort_limit")));
+
+  const Identified late = identified_pd(drive_terms({DriveTerm::base, DriveTerm::delay}), 0.02);
+  const WrittenDrive delayed =
+      write_drive(DriveTarget::isaaclab, late.drive, late.recordings, "servo", {.starts = 1});
+  EXPECT_THAT(delayed.text, HasSubstr("DelayedPDActuatorCfg("));
+  EXPECT_THAT(delayed.text, HasSubstr("max_delay=4,"));
+}
+
 }  // namespace
 }  // namespace torsio

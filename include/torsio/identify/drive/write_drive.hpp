@@ -29,8 +29,15 @@ struct WrittenDrive {
       not_expressed;  ///< terms of the identified drive that the target does not have
 };
 
+/// What `write_drive` asks of a drive, before one is identified.
 /// @param name of the actuator in the file
-/// @throws UsageError if the target has no drive of this law: BAM has position servos only.
+/// @throws UsageError if the target has no drive of this law: BAM has position servos only; or if the name is not of
+/// letters, digits and underscores.
+void require_writable(DriveTarget target, DriveLaw law, const std::string& name);
+
+/// @param recordings those of `identified`, in their order
+/// @param name of the actuator in the file
+/// @throws UsageError as `require_writable`, or for other recordings.
 [[nodiscard]] WrittenDrive write_drive(DriveTarget target, const DriveIdentification& identified,
                                        const std::vector<Recording>& recordings,
                                        const std::string& name,
