@@ -128,8 +128,9 @@ void check_call(DriveIdentifyFlags& flags) {
 torsio::DriveSheet drive_of(const DriveIdentifyFlags& flags, const torsio::Recording& recording) {
   if (!flags.drive.empty()) return torsio::read_drive_sheet(flags.drive);
   torsio::DriveSheet drive = torsio::assumed_drive_sheet(recording);
-  remark("note: no --drive; the channels suggest the law '" + std::string(torsio::name(drive.law)) +
-         "'");
+  const std::vector<std::string> commands = torsio::command_channels(drive.law);
+  remark(fmt::format("note: no --drive; the channels suggest the law '{}', with the command {}",
+                     torsio::name(drive.law), commands.front()));
   return drive;
 }
 

@@ -137,6 +137,26 @@ DriveSheet sheet_from(const YamlValue& root, const std::string& name) {
   return sheet;
 }
 
+/// @param has_two whether the goal is a command, and the torque or current another one
+[[noreturn]] void refuse_to_assume(const Recording& recording, bool has_two) {
+  const std::string found = "the channels " + joined(channel_names(recording.channels()));
+  if (has_two)
+    throw Error({.place = recording.name(),
+                 .expected =
+                     "a goal with what states its law (duty_1 and the condition supply_V, or "
+                     "the condition kp_Nm_rad), or one command alone",
+                 .found = found,
+                 .advice = "State which one drives the motor in a drive file (--drive), "
+                           "for example 'drive: {law: current}' (docs/use/identify.md)."});
+  throw Error({.place = recording.name(),
+               .expected =
+                   "channels that state the drive's law: goal_angle_rad, duty_1 and the condition "
+                   "supply_V; goal_angle_rad and the conditions kp_Nm_rad, kd_Nms_rad; "
+                   "motor_current_A; or command_torque_Nm",
+               .found = found,
+               .advice = "State the law in a drive file (--drive, docs/use/identify.md)."});
+}
+
 }  // namespace
 
 std::string_view name(DriveLaw law) { return kLaws[static_cast<std::size_t>(law)].first; }
@@ -163,36 +183,24 @@ DriveSheet read_drive_sheet(const std::string& path) {
 DriveSheet assumed_drive_sheet(const Recording& recording) {
   const auto has = [&](std::string_view channel) { return recording.has(channel); };
   DriveSheet sheet;
-  sheet.file = "the drive assumed without --drive";
-  if (has("goal_angle_rad") && has("kp_Nm_rad")) {
+  sheet.file = "the drive assumed without a drive file";
+  const bool has_goal = has("goal_angle_rad");
+  const bool has_torque = has("motor_current_A") || has("command_torque_Nm");
+  if (has_goal && has("kp_Nm_rad")) {
     sheet.law = DriveLaw::pd;
     sheet.kp_Nm_rad.condition = "kp_Nm_rad";
     if (has("kd_Nms_rad")) sheet.kd_Nms_rad.condition = "kd_Nms_rad";
     if (has("torque_limit_Nm")) sheet.torque_limit_Nm.condition = "torque_limit_Nm";
-    return sheet;
-  }
-  if (has("goal_angle_rad") && has("supply_V") && (has("duty_1"))) {
+  } else if (has_goal && has("supply_V") && has("duty_1")) {
     sheet.law = DriveLaw::position;
     if (has("kp_1")) sheet.gain.condition = "kp_1";
     sheet.supply_V.condition = "supply_V";
-    return sheet;
+  } else if (has_torque && !has_goal) {
+    sheet.law = has("motor_current_A") ? DriveLaw::current : DriveLaw::torque;
+  } else {
+    refuse_to_assume(recording, has_goal && has_torque);
   }
-  if (has("motor_current_A")) {
-    sheet.law = DriveLaw::current;
-    return sheet;
-  }
-  if (has("command_torque_Nm")) {
-    sheet.law = DriveLaw::torque;
-    return sheet;
-  }
-  throw Error(
-      {.place = recording.name(),
-       .expected = "channels that state the drive's law: goal_angle_rad, duty_1 and the condition "
-                   "supply_V; "
-                   "goal_angle_rad and the conditions kp_Nm_rad, kd_Nms_rad; motor_current_A; or "
-                   "command_torque_Nm",
-       .found = "the channels " + joined(channel_names(recording.channels())),
-       .advice = "State the law in a drive file: --drive drive.yaml (docs/use/identify.md)."});
+  return sheet;
 }
 
 }  // namespace torsio

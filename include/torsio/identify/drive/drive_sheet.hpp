@@ -47,8 +47,8 @@ struct DriveSheet {
 [[nodiscard]] DriveSheet parse_drive_sheet(std::string_view text, const std::string& name);
 
 /// The sheet of recordings whose channels and conditions state the law: those of a servo with goal, duty and gain, of
-/// `torsio simulate .. air-chirp`, or with the motor's current.
-/// @throws Error that states what is missing.
+/// `torsio simulate .. air-chirp`, or with the motor's current or, where there is none, the commanded torque.
+/// @throws Error that states what is missing, or that a goal without a law and a current or torque are two commands.
 [[nodiscard]] DriveSheet assumed_drive_sheet(const Recording& recording);
 
 /// The channels that a law's command may be in, the first that a recording has.
