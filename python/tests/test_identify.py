@@ -1,5 +1,6 @@
 import json
 import pathlib
+import xml.etree.ElementTree
 
 import numpy as np
 import pytest
@@ -79,6 +80,14 @@ def test_a_file_for_another_program_is_written(identified, tmp_path):
         identified.write("gazebo", path)
     with pytest.raises(torsio.UsageError, match="kp_1"):
         identified.write("mjcf", path, group_by="kp_1")
+
+
+def test_a_comment_of_xml_has_any_name_of_a_recording(identified, chirps, tmp_path):
+    chirps[0].write_csv(tmp_path / "air--one---.csv")
+    path = tmp_path / "joint.xml"
+    identified.write("mjcf", path, recordings=tmp_path / "air--one---.csv", starts=1)
+    assert "air- -one" in path.read_text()
+    assert xml.etree.ElementTree.parse(path).getroot().tag == "mujoco"
 
 
 def test_mistakes_are_named(chirps, load_file, tmp_path):

@@ -22,8 +22,9 @@ namespace {
 using DriveFileJson = nlohmann::ordered_json;
 
 constexpr std::string_view kDriveFileAdvice =
-    "Write the file again: torsio identify RECORDINGS --load load.yaml -o FILE.";
+    "Identify the drive again (torsio identify RECORDINGS --load load.yaml -o FILE).";
 constexpr std::size_t kMaxDriveFileBytes = 16U << 20U;
+constexpr double kShortestStep_s = 1e-6;  // a free run of a recording ends within seconds
 constexpr double kLongestStep_s = 0.1;
 
 DriveFileJson values_json(const DriveValues& values) {
@@ -266,9 +267,9 @@ DriveIdentification parse_identified_drive(std::string_view text, const std::str
   identified.terms = terms_from(document.text("terms"), name + "/terms");
   identified.values = values_from(document, identified.terms, name);
   identified.step_s = document.number("step_s");
-  if (!(identified.step_s > 0.0 && identified.step_s <= kLongestStep_s))
+  if (!(identified.step_s >= kShortestStep_s && identified.step_s <= kLongestStep_s))
     throw Error({.place = name + "/step_s",
-                 .expected = fmt::format("a step above 0, at most {} s", kLongestStep_s),
+                 .expected = fmt::format("a step from {} to {} s", kShortestStep_s, kLongestStep_s),
                  .found = fmt::format("{}", identified.step_s),
                  .advice = std::string(kDriveFileAdvice)});
   identified.mae_rad = document.number("mae_rad");

@@ -213,7 +213,7 @@ std::vector<std::string> drive_groups(const std::vector<Recording>& recordings,
     std::vector<std::string> values = values_of(recordings, group_by);
     if (values.empty()) values = label_of(recordings, group_by);
     if (!values.empty()) return values;
-    throw UsageError({.place = "--group-by " + group_by,
+    throw UsageError({.place = fmt::format("the groups by '{}' (--group-by)", group_by),
                       .expected = "a condition or a label that all recordings have, or 'recording'",
                       .found = names_of_groups(recordings)});
   }

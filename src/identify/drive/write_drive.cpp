@@ -340,8 +340,9 @@ std::string_view name(DriveTarget target) { return kTargetNames[static_cast<std:
 DriveTarget drive_target(std::string_view text) {
   for (std::size_t k = 0; k < kTargetNames.size(); ++k)
     if (kTargetNames[k] == text) return static_cast<DriveTarget>(k);
-  throw UsageError(
-      {.place = "--write", .expected = "bam, mjcf or isaaclab", .found = std::string(text)});
+  throw UsageError({.place = "the target (--write)",
+                    .expected = "bam, mjcf or isaaclab",
+                    .found = std::string(text)});
 }
 
 void require_writable(DriveTarget target, DriveLaw law, const std::string& name) {

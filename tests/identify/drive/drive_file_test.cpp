@@ -136,7 +136,9 @@ TEST(DriveFile, NamesWhatIsWrongInIt) {
               HasSubstr("servo.json/values/armature_kg_m2: expected a finite number, at least 0"));
   EXPECT_THAT(refusal_of([](nlohmann::json& d) { d["values"]["zero_rad"] = nullptr; }),
               HasSubstr("values/zero_rad: expected a finite number"));
-  EXPECT_THAT(refusal_of([](nlohmann::json& d) { d["step_s"] = 0.0; }), HasSubstr("step_s"));
+  for (const double step_s : {0.0, 1e-300, 1.0})
+    EXPECT_THAT(refusal_of([&](nlohmann::json& d) { d["step_s"] = step_s; }),
+                HasSubstr("step_s: expected a step from 1e-06 to 0.1 s"));
   EXPECT_THAT(refusal_of([](nlohmann::json& d) { d.erase("load_file"); }), HasSubstr("load_file"));
   EXPECT_THAT(
       refusal_of([](nlohmann::json& d) { d["load_file"]["load"]["pendulum"]["mass"] = "0.5m"; }),
