@@ -10,6 +10,7 @@
 #include "report/json_text.hpp"
 #include "report/plots.hpp"
 #include "report/result_parts.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -61,11 +62,23 @@ std::string plot_of_stop(const MonitorReplay& replay, const MonitorSettings& set
   return terminal_plot(curves_of(replay, settings, time_s, begin, end), {"t [s]", "torque [Nm]"});
 }
 
+/// What the stop did to a simulated joint; the joint of a recording goes on.
+std::string stop_text(const MonitorReplay& replay) {
+  if (!replay.rest) return fmt::format("would stop at {:.3f} s", replay.stopped_at_s);
+  const double moved_deg = deg_from_rad(replay.rest->moved_rad);
+  const std::string begin =
+      fmt::format("stopped at {:.3f} s, power off and brake closed: ", replay.stopped_at_s);
+  if (std::isnan(replay.rest->after_s))
+    return begin + fmt::format("not at rest at the end, {:.3g} deg farther", moved_deg);
+  return begin + fmt::format("at rest {:.0f} ms later, {:.3g} deg farther",
+                             1e3 * replay.rest->after_s, moved_deg);
+}
+
 std::string verdict(const MonitorReplay& replay) {
   if (std::isnan(replay.watching_from_s)) return "was never ready, and not armed";
   if (std::isnan(replay.stopped_at_s))
     return fmt::format("no stop from {:.3f} s to the end", replay.watching_from_s);
-  return fmt::format("stopped at {:.3f} s", replay.stopped_at_s);
+  return stop_text(replay);
 }
 
 std::string text_of(const MonitorReplay::Finding& finding, const MonitorSettings& settings) {
@@ -84,7 +97,7 @@ std::string outcome(const MonitorReplay& replay, const MonitorReplay::Injection&
   if (std::isnan(replay.watching_from_s)) return "not detected, since the monitor was never ready";
   if (replay.stopped_at_s < of.start_s) return "the joint had stopped before";
   if (const double after_s = stopped_after_s(replay, of); !std::isnan(after_s))
-    return fmt::format("stopped after {:.0f} ms", 1e3 * after_s);
+    return fmt::format("stop after {:.0f} ms", 1e3 * after_s);
   for (const MonitorEvent& event : replay.events)
     if (event.t_s >= of.start_s)
       return fmt::format("no stop, a warning after {:.0f} ms", 1e3 * (event.t_s - of.start_s));
@@ -234,6 +247,9 @@ std::string replays_json(const std::vector<MonitorReplay>& replays,
                                       {"injections", std::move(injections)},
                                       {"not_ready", std::move(not_ready)},
                                       {"threshold_too_large_s", replay.threshold_too_large_s}});
+    if (replay.rest)
+      document["recordings"].back()["rest"] = {{"after_s", json_number(replay.rest->after_s)},
+                                               {"moved_rad", json_number(replay.rest->moved_rad)}};
   }
   return json_text(document);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,12 @@ struct MonitorReplay {
   double threshold_too_large_s = 0.0;
   /// Given by the caller, for the report.
   std::vector<Injection> injections = {};
+  /// How a simulated joint came to rest after the stop, given by the caller.
+  struct Rest {
+    double after_s = kNotMeasured;  ///< NaN: it was not at rest at the end
+    double moved_rad = 0.0;         ///< from the stop to the end
+  };
+  std::optional<Rest> rest = {};
 };
 
 /// Streams the recording through sources, redundancy and monitor from `reset()`, as a loop would.

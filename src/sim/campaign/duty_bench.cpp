@@ -57,7 +57,8 @@ DutyBench::Lane::Lane(const DutyLane& from, double run_s)
       is_loop_sound(from.is_loop_sound) {}
 
 DutyBench::DutyBench(const std::vector<DutyLane>& lanes, const Options& options)
-    : plants_(sheets_of(lanes), drive_seeds(lanes, options.is_electrical), options.is_single),
+    : plants_(sheets_of(lanes), drive_seeds(lanes, options.is_electrical), options.is_single,
+              options.has_brakes),
       commands_(lanes.size()),
       loads_(lanes.size()) {
   lanes_.reserve(lanes.size());
@@ -70,6 +71,9 @@ DutyBench::DutyBench(const std::vector<DutyLane>& lanes, const Options& options)
     lane.duty.start_at(plants_.sensed(lanes_.size() - 1).state.rotor_angle_rad /
                        total_ratio(plant_parameters(from.sheet)));
     lane.sensors.reset(plants_.torques(lanes_.size() - 1).joint_Nm);
+    if (!options.has_brakes) continue;
+    plants_.set_brake(lanes_.size() - 1, /*is_closed=*/false);
+    lane.brake_V = brake_parameters(from.sheet).activation_V;
   }
 }
 
@@ -93,6 +97,8 @@ void DutyBench::act() {
     const Measurement& seen = lane.is_loop_sound ? lane.sound : lane.measured;
     const double current_A = lane.loop.step(lane.duty.wanted_rad(), seen.motor_angle_rad);
     commands_[i].current_A = lane.is_cut ? 0.0 : current_A;
+    commands_[i].is_powered = !(lane.is_cut && lane.brake_V > 0.0);
+    commands_[i].brake_V = lane.is_cut ? 0.0 : lane.brake_V;
     if (!lane.has_faults && !lane.duty.is_condition_new()) continue;
     lane.condition =
         lane.faults.condition(time_s(), {.friction_factor = lane.duty.friction_factor()});

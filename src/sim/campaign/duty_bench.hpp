@@ -36,7 +36,8 @@ class DutyBench {
  public:
   struct Options {
     bool is_electrical = false;
-    bool is_single = false;  ///< each a `Plant`, for what only that one has
+    bool is_single = false;   ///< each a `Plant`, for what only that one has
+    bool has_brakes = false;  ///< that a cut closes, as it removes the power
   };
   /// @param lanes of one kind, as `PlantBatch` requires
   /// @throws Error if a plant refuses its start, UsageError as `FaultInjector`.
@@ -66,7 +67,7 @@ class DutyBench {
   /// Advances all joints to the next tick. A plant that refuses its input stays as it is; one whose
   /// state is not finite begins again at rest.
   void act();
-  /// From now on the joint has no current.
+  /// From now on the joint has no current; a brake closes.
   void cut(std::size_t lane) noexcept { lanes_[lane].is_cut = true; }
 
  private:
@@ -79,6 +80,7 @@ class DutyBench {
     bool has_faults;
     bool is_loop_sound;
     bool is_cut = false;
+    double brake_V = 0.0;  ///< voltage that holds the brake open; 0: there is none
     double torque_Nm = 0.0;
     Measurement sound;
     Measurement measured;

@@ -1,5 +1,7 @@
 #include "duty_plants.hpp"
 
+#include <algorithm>
+
 namespace torsio {
 namespace {
 
@@ -15,10 +17,16 @@ bool has_table(const DataSheet& sheet) {
 }
 
 std::vector<Plant> single_plants(std::span<const DataSheet> sheets,
-                                 std::span<const std::uint64_t> drive_seeds) {
+                                 std::span<const std::uint64_t> drive_seeds, bool has_brakes) {
   std::vector<Plant> plants;
   for (std::size_t lane = 0; lane < sheets.size(); ++lane) {
-    plants.emplace_back(plant_parameters(sheets[lane]));
+    const PlantParameters parameters = plant_parameters(sheets[lane]);
+    if (has_brakes) {
+      plants.emplace_back(parameters, braked_step_s(parameters));
+      plants.back().use(brake_parameters(sheets[lane]));
+    } else {
+      plants.emplace_back(parameters);
+    }
     if (!drive_seeds.empty())
       plants.back().use(electrical_parameters(sheets[lane], drive_seeds[lane]));
   }
@@ -27,12 +35,17 @@ std::vector<Plant> single_plants(std::span<const DataSheet> sheets,
 
 }  // namespace
 
+double braked_step_s(const PlantParameters& parameters) {
+  return 0.25 * std::min(Plant::step_limit(parameters), Plant::kDefaultStep_s);
+}
+
 DutyPlants::DutyPlants(std::span<const DataSheet> sheets,
-                       std::span<const std::uint64_t> drive_seeds, bool is_single) {
-  is_single = is_single || !drive_seeds.empty();
+                       std::span<const std::uint64_t> drive_seeds, bool is_single,
+                       bool has_brakes) {
+  is_single = is_single || has_brakes || !drive_seeds.empty();
   for (const DataSheet& sheet : sheets) is_single = is_single || has_table(sheet);
   if (is_single) {
-    plants_ = single_plants(sheets, drive_seeds);
+    plants_ = single_plants(sheets, drive_seeds, has_brakes);
   } else {
     plants_ = PlantBatch(parameters_of(sheets));
   }
@@ -48,6 +61,10 @@ Fault DutyPlants::set_condition(std::size_t lane, const PlantCondition& conditio
   if (auto* const batch = std::get_if<PlantBatch>(&plants_))
     return batch->set_condition(lane, condition);
   return (*std::get_if<0>(&plants_))[lane].set_condition(condition);
+}
+
+void DutyPlants::set_brake(std::size_t lane, bool is_closed) noexcept {
+  if (auto* const plants = std::get_if<0>(&plants_)) (*plants)[lane].set_brake(is_closed);
 }
 
 Fault DutyPlants::step(std::span<const PlantCommand> commands, std::span<const Load> loads,

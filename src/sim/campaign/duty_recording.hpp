@@ -10,6 +10,8 @@
 
 namespace torsio {
 
+class MonitoredTorque;
+
 /// The random work of a simulated joint (`duty_recording`). All values are assumed.
 struct DutySettings {
   double gravity_share =
@@ -40,6 +42,8 @@ struct DutyRun {
   bool is_electrical = false;  ///< with windings, inverter and current control
   bool with_truth = false;     ///< add the `truth_*` channels
   FaultSchedule faults = {};   ///< on the sensors, for the position loop as well, and on the parts
+  /// Watches the joint, armed as soon as it is ready: its stop removes the power and closes the brake. Null: none.
+  const MonitoredTorque* guard = nullptr;
 };
 
 /// A joint at work: random moves, rests, loads, temperature, wear of its friction and impacts, all at
@@ -47,7 +51,7 @@ struct DutyRun {
 /// `torque_Nm` of a load cell that samples at 1 kHz without latency. Equal arguments give equal
 /// recordings.
 /// @throws UsageError for a duration that is not 1 ms to 10 h, or faults that this actuator cannot have in
-/// it; Cancelled.
+/// it; Error if the guard has an input that this actuator's sensors do not measure; Cancelled.
 [[nodiscard]] Recording duty_recording(const DataSheet& sheet, const DutyRun& run,
                                        const Progress& progress = {});
 

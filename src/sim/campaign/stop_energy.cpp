@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "duty_plants.hpp"
 #include "sim/experiments/experiment_table.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/design/drive.hpp"
@@ -22,8 +23,7 @@ double stop_energy_gain(const DataSheet& sheet, const PlantState& state, const L
   Load load = at_stop;
   load.external_torque_Nm = 0.0;
   const PlantParameters parameters = plant_parameters(sheet);
-  // The brake's bristle is stiffer than what the usual steps follow.
-  Plant plant(parameters, 0.25 * std::min(Plant::step_limit(parameters), Plant::kDefaultStep_s));
+  Plant plant(parameters, braked_step_s(parameters));
   plant.use(brake);
   plant.set_brake(false);
   if (plant.reset(state) != Fault::none) return kNotMeasured;

@@ -54,7 +54,7 @@ TEST(CalibrateMonitor, FindsAFaultAndNamesWhatExplainsIt) {
   EXPECT_EQ(replay.events.back().check, MonitorCheck::disagreement);
   EXPECT_THAT(replay.suspects, testing::UnorderedElementsAre("encoder", "current_sensor"));
   const std::string text = replays_text({replay}, monitor.monitor);
-  EXPECT_THAT(text, HasSubstr("stopped at 4.2"));
+  EXPECT_THAT(text, HasSubstr("would stop at 4.2"));
   EXPECT_THAT(text, HasSubstr("the torques of spring and current differ by"));
   EXPECT_THAT(replays_json({replay}, monitor.monitor), HasSubstr("\"check\": \"disagreement\""));
 }
@@ -373,7 +373,7 @@ TEST(ReplayMonitor, ListsTheOutcomeOfEachInjection) {
   replay.injections = {{"gain", 4.25}, {"second", 9.0}, {"third", 20.0}};
   EXPECT_THAT(
       replays_text({replay}, monitor.monitor),
-      testing::AllOf(testing::ContainsRegex("injected at 4.250 s, gain: stopped after [0-9]+ ms"),
+      testing::AllOf(testing::ContainsRegex("injected at 4.250 s, gain: stop after [0-9]+ ms"),
                      HasSubstr("9.000 s, second: the joint had stopped before"),
                      HasSubstr("20.000 s, third: after the end of the recording")));
   EXPECT_THAT(replays_json({replay}, monitor.monitor),

@@ -7,6 +7,7 @@
 
 #include "sim/campaign/duty_bench.hpp"
 #include "sim/campaign/duty_recording.hpp"
+#include "sim/campaign/toy_monitor.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -147,6 +148,26 @@ TEST(DutyRecording, HasTheFaultsOfItsSensors) {
 TEST(DutyRecording, RefusesADurationOutOfRange) {
   EXPECT_THROW((void)duty_recording(data_sheet("dfki-28"), {.duration_s = -1.0}), UsageError);
   EXPECT_THROW((void)duty_recording(data_sheet("dfki-28"), {.duration_s = NAN}), UsageError);
+}
+
+TEST(GuardedWork, EndsAtRestAfterTheStopOfItsMonitor) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  const MonitoredTorque monitor = test::toy_monitor();
+  DutyRun work{.seed = 1, .duration_s = 8.0, .with_truth = true};
+  work.faults.faults.push_back(parse_injection("gear_angle=5deg@4s", sheet));
+  const Recording without = duty_recording(sheet, work);
+  work.guard = &monitor;
+  const Recording guarded = duty_recording(sheet, work);
+  const auto moved_rad = [](const Recording& recording) {
+    const std::vector<double>& angle = recording.channel("truth_joint_angle_rad").values;
+    const auto [low, high] = std::minmax_element(angle.begin() + 4500, angle.end());
+    return *high - *low;
+  };
+  EXPECT_GT(moved_rad(without), 0.1);
+  EXPECT_LT(moved_rad(guarded), 1e-3);
+  // The work before the fault is the same; the smaller steps of a plant with a brake change it little.
+  const std::vector<double>& angle = guarded.channel("truth_joint_angle_rad").values;
+  EXPECT_NEAR(angle[3900], without.channel("truth_joint_angle_rad").values[3900], 1e-3);
 }
 
 }  // namespace
