@@ -62,7 +62,7 @@ std::string plot_of_stop(const MonitorReplay& replay, const MonitorSettings& set
   return terminal_plot(curves_of(replay, settings, time_s, begin, end), {"t [s]", "torque [Nm]"});
 }
 
-/// What the stop did to a simulated joint; the joint of a recording goes on.
+/// What the stop did to a simulated joint; that of a recording is not stopped.
 std::string stop_text(const MonitorReplay& replay) {
   if (!replay.rest) return fmt::format("would stop at {:.3f} s", replay.stopped_at_s);
   const double moved_deg = deg_from_rad(replay.rest->moved_rad);
