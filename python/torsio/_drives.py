@@ -30,7 +30,9 @@ class DriveParameter:
     lowest_95: float  #: ends of the 95 % interval; NaN with fewer than three recordings
     highest_95: float
     standard_error_from_load: float  #: the part of it that the load's errors cause
-    is_determined: bool  #: the interval spans less than a factor of 10
+    #: The interval spans less than a factor of 10, or less than half of the range of a number that may be negative; None
+    #: without standard errors: not known.
+    is_determined: bool | None
     is_at_bound: bool
 
 

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "identify/drive/drive_document.hpp"
 #include "report/drive_advice_json.hpp"
@@ -32,7 +35,41 @@ std::string structure_text(const DriveIdentification& identified) {
                      terms_text(identified.terms), steps);
 }
 
+std::string findings_text(const std::vector<DriveFinding>& findings) {
+  std::string text;
+  for (const DriveFinding& finding : findings)
+    text += fmt::format("{} {}: {}\n", finding.is_failure ? "FAIL" : "WARN", finding.subject,
+                        finding.text);
+  return text.empty() ? text : text + "\n";
+}
+
+std::string error_gain_text(const DriveIdentification& identified) {
+  if (!identified.error_gain) return {};
+  return fmt::format(
+      "error_gain measured from the duty: {:.5g} for 1 rad at gain 1, {:.0f} ms after the goal, "
+      "residual {:.2g} (RMS of the duty)\n",
+      identified.error_gain->value_1_rad, 1e3 * identified.error_gain->delay_s,
+      identified.error_gain->residual_duty_1);
+}
+
+std::string standard_error_text(const DriveIdentification& identified) {
+  if (!has_standard_errors(identified))
+    return "standard errors: none, so that it is not known which parameters these recordings "
+           "determine. They need three\nrecordings, and fits without each of them.\n";
+  return fmt::format(
+      "standard errors: from fits without one recording each ({} recordings, Student's t), and "
+      "from the uncertainty of the load.\nThey do not contain what is wrong in all recordings "
+      "alike, such as the stated supply.\n",
+      identified.recordings.size());
+}
+
 }  // namespace
+
+bool has_standard_errors(const DriveIdentification& identified) {
+  return std::ranges::any_of(identified.parameters, [](const IdentifiedDriveParameter& parameter) {
+    return parameter.is_determined.has_value();
+  });
+}
 
 TextTable drive_parameter_table(const DriveIdentification& identified) {
   TextTable table;
@@ -41,7 +78,7 @@ TextTable drive_parameter_table(const DriveIdentification& identified) {
     const DriveParameterInfo& info = drive_parameter_info(parameter.parameter);
     std::string note(info.meaning);
     if (parameter.is_at_bound) note += " (at its bound)";
-    if (!parameter.is_determined) note += " (not determined)";
+    if (parameter.is_determined == false) note += " (not determined)";
     table.row({std::string(info.name), number_or_dash(parameter.value),
                number_or_dash(parameter.standard_error),
                std::isfinite(parameter.lowest)
@@ -79,34 +116,14 @@ std::string drive_evaluation_text(const DriveIdentification& evaluated) {
 }
 
 std::string identification_text(const DriveIdentification& identified) {
-  std::string text;
-  for (const DriveFinding& finding : identified.findings)
-    text += fmt::format("{} {}: {}\n", finding.is_failure ? "FAIL" : "WARN", finding.subject,
-                        finding.text);
-  if (!text.empty()) text += "\n";
+  std::string text = findings_text(identified.findings);
   text += drive_parameter_table(identified).text() + "\n" + drive_score_table(identified).text();
   text +=
       "mean |measured - simulated angle| in free runs from the command alone. held out: fitted "
-      "without the recording's "
-      "group;\nnested: the terms were chosen without it, too. Of these three only the last one "
-      "chose nothing by what it "
-      "scores.\n\n";
-  text += structure_text(identified);
-  if (identified.error_gain)
-    text += fmt::format(
-        "error_gain measured from the duty: {:.5g} for 1 rad at gain 1, {:.0f} ms after the goal, "
-        "residual {:.2g} (RMS of the duty)\n",
-        identified.error_gain->value_1_rad, 1e3 * identified.error_gain->delay_s,
-        identified.error_gain->residual_duty_1);
-  if (!identified.parameters.empty() && std::isfinite(identified.parameters.front().standard_error))
-    text += fmt::format(
-        "standard errors: from fits without one recording each ({} recordings, Student's t), and "
-        "from the "
-        "uncertainty of the load.\nThey do not contain what is wrong in all recordings alike, such "
-        "as the "
-        "stated supply.\n",
-        identified.recordings.size());
-  return text;
+      "without the recording's group;\nnested: the terms were chosen without it, too. Of these "
+      "three only the last one chose nothing by what it scores.\n\n";
+  return text + structure_text(identified) + error_gain_text(identified) +
+         standard_error_text(identified);
 }
 
 TextTable drive_advice_table(const std::vector<DriveAdvice>& advice) {

@@ -16,6 +16,8 @@ namespace torsio {
 [[nodiscard]] std::string identification_json(const DriveIdentification& identified,
                                               const std::vector<DriveAdvice>& advice);
 
+/// Whether it is known which parameters are determined.
+[[nodiscard]] bool has_standard_errors(const DriveIdentification& identified);
 /// Each parameter with its standard error, its interval and what it is.
 [[nodiscard]] TextTable drive_parameter_table(const DriveIdentification& identified);
 /// The errors of the free runs, one row for each recording and one for the mean.

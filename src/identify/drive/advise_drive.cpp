@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/aligned_vector.hpp"
+#include "identify/drive/drive_course.hpp"
 #include "identify/drive/drive_fit.hpp"
 #include "identify/drive/drive_logs.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/identify/drive/identify_drive.hpp"
 
@@ -34,13 +38,15 @@ CandidateLog release(const DriveLog& like, const DriveIdentification& identified
   constexpr double kDuration_s = 3.0;
   constexpr double kFrom_rad = 1.5;
   DriveLog log = like;
-  const auto samples = static_cast<std::size_t>(kDuration_s / log.sample_period_s);
+  // A recording at a low rate is longer, so that it has the samples that a log needs.
+  const auto samples =
+      std::max(static_cast<std::size_t>(kDuration_s / log.sample_period_s), kFewestDriveSamples);
   log.command.assign(samples, 0.0);
   log.command_end.clear();  // the recording may be shorter
   log.angle_rad.assign(samples, 0.0);
   log.enabled.assign(samples, 0.0);
-  return {fmt::format("the mass released at {:.0f} deg from hanging, power off, {:g} s",
-                      deg_from_rad(kFrom_rad), kDuration_s),
+  return {fmt::format("the mass released at {:.0f} deg from hanging, power off, {:.3g} s",
+                      deg_from_rad(kFrom_rad), static_cast<double>(samples) * log.sample_period_s),
           simulated(log, identified, {0, samples, kFrom_rad - log.load.load.zero_rad, 0.0})};
 }
 
@@ -78,59 +84,86 @@ std::optional<CandidateLog> gain_between(const std::vector<DriveLog>& logs,
       simulated(log, identified, start_of(log))};
 }
 
-Eigen::MatrixXd matrix_of(const DriveLogs& logs, const DriveIdentification& identified,
-                          const DriveFitOptions& options) {
-  const DriveProblem problem = drive_problem(logs, identified.terms, options);
+/// The searched parameters of a set of logs and how sharply these determine them.
+struct DriveInformation {
+  std::vector<SearchedDriveParameter> searched;
+  Eigen::MatrixXd matrix;
+};
+
+DriveInformation information_of(const DriveLogs& logs, const DriveIdentification& identified) {
+  const DriveProblem problem = drive_problem(logs, identified.terms, {.step_s = identified.step_s});
   const std::vector<double> rows = drive_information(problem, identified.values);
   const auto count = static_cast<Eigen::Index>(problem.searched.size());
-  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-      rows.data(), count, count);
+  return {problem.searched,
+          Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+              rows.data(), count, count)};
+}
+
+/// A recording that could be made next.
+struct Candidate {
+  std::string text;
+  Eigen::MatrixXd information;
+};
+
+/// The recording that moves the parameters most is the one to vary.
+std::size_t strongest_of(const std::vector<DriveLog>& logs, const Eigen::MatrixXd& covariance,
+                         const DriveIdentification& identified) {
+  std::size_t strongest = 0;
+  double most = 0.0;
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    const double gain = (covariance * information_of({&logs[k]}, identified).matrix).trace();
+    if (gain > most) {
+      most = gain;
+      strongest = k;
+    }
+  }
+  return strongest;
+}
+
+std::vector<Candidate> candidates_of(const std::vector<DriveLog>& logs, const DriveLog& strongest,
+                                     const DriveIdentification& identified) {
+  std::vector<Candidate> candidates;
+  const auto add = [&](const CandidateLog& candidate) {
+    candidates.push_back({candidate.text, information_of({&candidate.log}, identified).matrix});
+  };
+  add({strongest.name + " once more", strongest});
+  if (std::ranges::none_of(
+          logs, [](const DriveLog& log) { return drive_course(log).has_passive_motion; }))
+    add(release(strongest, identified));
+  add(second_mass(strongest, identified));
+  if (const auto between = gain_between(logs, identified)) add(*between);
+  return candidates;
+}
+
+double standard_error_of(const DriveIdentification& identified, DriveParameter parameter) {
+  const auto found =
+      std::ranges::find(identified.parameters, parameter, &IdentifiedDriveParameter::parameter);
+  return found == identified.parameters.end() ? kNotMeasured : found->standard_error;
 }
 
 }  // namespace
 
 std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
                                       const std::vector<Recording>& recordings) {
+  if (recordings.empty())
+    throw UsageError({.place = "advise_drive", .expected = "recordings", .found = "none"});
   const std::vector<DriveLog> logs = drive_logs(recordings, identified.load, identified.drive);
-  const DriveLogs all = pointers_to(logs);
-  const DriveFitOptions options{.step_s = identified.step_s};
-  Eigen::MatrixXd before = matrix_of(all, identified, options);
+  DriveInformation before = information_of(pointers_to(logs), identified);
   // What no recording moves has a finite variance all the same.
-  before.diagonal().array() += 1e-9 * std::max(before.diagonal().maxCoeff(), 1e-300);
-  const Eigen::MatrixXd covariance = before.inverse();
+  before.matrix.diagonal().array() += 1e-9 * std::max(before.matrix.diagonal().maxCoeff(), 1e-300);
+  const Eigen::MatrixXd covariance = before.matrix.inverse();
   const Eigen::VectorXd variance = covariance.diagonal();
-
-  // The recording that moves the parameters most is the one to vary.
-  std::size_t strongest = 0;
-  double most = 0.0;
-  std::vector<Eigen::MatrixXd> own;
-  for (std::size_t k = 0; k < logs.size(); ++k) {
-    own.push_back(matrix_of({&logs[k]}, identified, options));
-    const double gain = (covariance * own.back()).trace();
-    if (gain > most) {
-      most = gain;
-      strongest = k;
-    }
-  }
-  std::vector<std::pair<std::string, Eigen::MatrixXd>> candidates;
-  candidates.emplace_back(fmt::format("{} once more", logs[strongest].name), own[strongest]);
-  const auto add = [&](const CandidateLog& candidate) {
-    candidates.emplace_back(candidate.text, matrix_of({&candidate.log}, identified, options));
-  };
-  add(release(logs[strongest], identified));
-  add(second_mass(logs[strongest], identified));
-  if (const auto between = gain_between(logs, identified)) add(*between);
-
+  const DriveLog& strongest = logs[strongest_of(logs, covariance, identified)];
   std::vector<DriveAdvice> advice;
-  for (const auto& [text, matrix] : candidates) {
-    if (!matrix.allFinite()) continue;
-    const Eigen::VectorXd after = (before + matrix).inverse().diagonal();
+  for (const Candidate& candidate : candidates_of(logs, strongest, identified)) {
+    if (!candidate.information.allFinite()) continue;
+    const Eigen::VectorXd after = (before.matrix + candidate.information).inverse().diagonal();
     Eigen::Index best = 0;
     const double ratio = (after.array() / variance.array()).minCoeff(&best);
-    const IdentifiedDriveParameter& parameter =
-        identified.parameters[static_cast<std::size_t>(best)];
-    advice.push_back(
-        {text, parameter.parameter, parameter.standard_error, std::sqrt(std::max(ratio, 0.0))});
+    const auto parameter =
+        static_cast<DriveParameter>(before.searched[static_cast<std::size_t>(best)].index);
+    advice.push_back({candidate.text, parameter, standard_error_of(identified, parameter),
+                      std::sqrt(std::max(ratio, 0.0))});
   }
   std::ranges::stable_sort(advice, {}, &DriveAdvice::standard_error_ratio);
   return advice;

@@ -3,98 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <complex>
 #include <map>
 #include <numbers>
-#include <span>
 
-#include "core/aligned_vector.hpp"
-#include "identify/drive/drive_fit.hpp"
-#include "identify/drive/drive_rollout.hpp"
+#include "identify/drive/drive_course.hpp"
+#include "identify/drive/drive_findings.hpp"
 
 namespace torsio {
 namespace {
 
-bool is_on(const DriveLog& log, std::size_t n) {
-  return log.enabled.empty() || log.enabled[n] != 0.0;
-}
-
-/// Speed over 25 ms around a sample.
-double speed_at(const DriveLog& log, std::size_t n) {
-  const auto reach =
-      std::max<std::size_t>(static_cast<std::size_t>(std::lround(0.0125 / log.sample_period_s)), 1);
-  const std::size_t before = n > reach ? n - reach : 0;
-  const std::size_t after = std::min(n + reach, log.size() - 1);
-  return (log.angle_rad[after] - log.angle_rad[before]) /
-         (static_cast<double>(after - before) * log.sample_period_s);
-}
-
-/// What of a log the checks look at.
-struct Course {
-  double largest_speed_rad_s = 0.0;
-  double saturated_share = 0.0;  ///< share of the moving samples with power
-  bool has_passive_motion = false;
-  double lowest_load_Nm = HUGE_VAL;  ///< lowest torque of the load
-  double highest_load_Nm = -HUGE_VAL;
-  double command_range = 0.0;
-  double angle_range_rad = 0.0;
-};
-
-Course course_of(const DriveLog& log) {
-  Course course;
-  constexpr double kMoving_rad_s = 0.02;
-  std::size_t moving = 0;
-  std::size_t saturated = 0;
-  std::size_t passive = 0;
-  for (std::size_t n = 0; n < log.size(); ++n) {
-    const double speed = speed_at(log, n);
-    course.largest_speed_rad_s = std::max(course.largest_speed_rad_s, std::abs(speed));
-    const JointLoad& load = log.load.load;
-    const std::size_t next = std::min(n + 1, log.size() - 1);
-    const double acceleration = (speed_at(log, next) - speed) / log.sample_period_s;
-    const double torque = load.gravity_Nm * std::sin(log.angle_rad[n] + load.zero_rad) +
-                          (load.gravity_Nm > 0.0 ? 0.0 : load.inertia_kg_m2 * acceleration);
-    course.lowest_load_Nm = std::min(course.lowest_load_Nm, torque);
-    course.highest_load_Nm = std::max(course.highest_load_Nm, torque);
-    if (std::abs(speed) < kMoving_rad_s) continue;
-    if (!is_on(log, n)) {
-      ++passive;
-      continue;
-    }
-    ++moving;
-    double output = log.command[n];
-    if (log.kind == CommandKind::goal_to_duty || log.kind == CommandKind::goal_to_torque)
-      output = log.gain * (log.command[n] - log.angle_rad[n]);
-    if (log.limit > 0.0 && std::abs(output) >= log.limit) ++saturated;
-  }
-  course.saturated_share =
-      moving > 0 ? static_cast<double>(saturated) / static_cast<double>(moving) : 0.0;
-  course.has_passive_motion = static_cast<double>(passive) * log.sample_period_s > 0.1;
-  const auto [low, high] = std::ranges::minmax(log.command);
-  course.command_range = high - low;
-  const auto [left, right] = std::ranges::minmax(log.angle_rad);
-  course.angle_range_rad = right - left;
-  return course;
-}
-
-class Findings {
- public:
-  void fail(std::string subject, std::string text) {
-    all_.push_back({true, std::move(subject), std::move(text)});
-  }
-  void warn(std::string subject, std::string text) {
-    all_.push_back({false, std::move(subject), std::move(text)});
-  }
-  [[nodiscard]] std::vector<DriveFinding> take() { return std::move(all_); }
-
- private:
-  std::vector<DriveFinding> all_;
-};
-
-void check_load(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
-                Findings& findings) {
+void check_load(const std::vector<DriveLog>& logs, const std::vector<DriveCourse>& courses,
+                DriveFindings& findings) {
   double lowest = HUGE_VAL;
   double highest = -HUGE_VAL;
   double scale = 0.0;
@@ -132,8 +52,8 @@ void check_load(const std::vector<DriveLog>& logs, const std::vector<Course>& co
 }
 
 /// Angles of a load that hangs, whose numbers are rather degrees.
-void check_turns(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
-                 Findings& findings) {
+void check_turns(const std::vector<DriveLog>& logs, const std::vector<DriveCourse>& courses,
+                 DriveFindings& findings) {
   constexpr double kManyTurns_rad = 8.0 * std::numbers::pi;
   for (std::size_t k = 0; k < logs.size(); ++k) {
     if (courses[k].angle_range_rad < kManyTurns_rad || logs[k].load.load.gravity_Nm <= 0.0)
@@ -148,7 +68,7 @@ void check_turns(const std::vector<DriveLog>& logs, const std::vector<Course>& c
 }
 
 /// One drive is identified at a time; a log of BAM names its motor.
-void check_motors(const std::vector<Recording>& recordings, Findings& findings) {
+void check_motors(const std::vector<Recording>& recordings, DriveFindings& findings) {
   std::map<std::string, std::string> first_recording;  // by motor
   for (const Recording& recording : recordings)
     for (const auto& [label, text] : recording.labels)
@@ -161,22 +81,47 @@ void check_motors(const std::vector<Recording>& recordings, Findings& findings) 
                              ". Identify each drive from its own recordings.");
 }
 
-void check_saturation(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
-                      Findings& findings) {
-  double sum = 0.0;
-  for (std::size_t k = 0; k < logs.size(); ++k)
-    sum += courses[k].saturated_share / static_cast<double>(logs.size());
-  constexpr double kMost = 0.9;
-  if (sum > kMost)
+/// A free run begins with the goal and the angle on the same side of the gear.
+/// @returns whether they are not
+bool check_gear(const std::vector<DriveLog>& logs, const std::vector<DriveCourse>& courses,
+                DriveFindings& findings) {
+  constexpr double kLeastRatio = 2.0;  // A swing at a resonance is not in phase with its goal.
+  constexpr double kTogether = 0.9;
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    const DriveCourse& course = courses[k];
+    if (course.angle_per_goal < kLeastRatio || course.angle_with_goal < kTogether) continue;
     findings.fail(
-        "saturation",
-        fmt::format("The drive's output is at its limit in {:.0f} % of the moving samples: the "
-                    "command does not determine the torque. Record smaller or slower motions.",
-                    100.0 * sum));
+        "gear ratio",
+        fmt::format("In {} the angle turns {:.3g} times as far as its goal. If it is that of the "
+                    "motor before the gear, state gear_ratio in the drive file, or the condition "
+                    "gear_ratio_1 of the recordings, by which motor_angle_rad is divided.",
+                    logs[k].name, course.angle_per_goal));
+    return true;
+  }
+  return false;
 }
 
-void check_command(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
-                   Findings& findings) {
+/// The share is that of all moving samples with power, so that recordings without power do not count.
+void check_saturation(const std::vector<DriveCourse>& courses, DriveFindings& findings) {
+  std::size_t driven = 0;
+  std::size_t saturated = 0;
+  for (const DriveCourse& course : courses) {
+    driven += course.driven;
+    saturated += course.saturated;
+  }
+  constexpr double kMost = 0.9;
+  const double share = static_cast<double>(saturated) / static_cast<double>(driven);
+  if (driven > 0 && share > kMost)
+    findings.fail(
+        "saturation",
+        fmt::format(
+            "The drive's output is at its limit in {:.0f} % of the moving samples with power: the "
+            "command does not determine the torque. Record smaller or slower motions.",
+            100.0 * share));
+}
+
+void check_command(const std::vector<DriveLog>& logs, const std::vector<DriveCourse>& courses,
+                   DriveFindings& findings) {
   for (std::size_t k = 0; k < logs.size(); ++k)
     if (courses[k].command_range > 0.0) return;
   findings.fail("command",
@@ -185,17 +130,18 @@ void check_command(const std::vector<DriveLog>& logs, const std::vector<Course>&
                 "commanded, or name the command's channel in the drive file.");
 }
 
-void check_passive(const std::vector<DriveLog>& logs, const std::vector<Course>& courses,
-                   Findings& findings) {
+void check_passive(const std::vector<DriveLog>& logs, const std::vector<DriveCourse>& courses,
+                   DriveFindings& findings) {
   if (!has_winding(logs.front().kind)) return;
-  if (std::ranges::none_of(courses, [](const Course& course) { return course.has_passive_motion; }))
+  if (std::ranges::none_of(courses,
+                           [](const DriveCourse& course) { return course.has_passive_motion; }))
     findings.warn(
         "passive run",
         "No recording has a motion without power (enabled_1 = 0), so that the motor's back-EMF and "
         "viscous friction are hardly separable. Record the mass released with the power off.");
 }
 
-void check_number(const std::vector<DriveLog>& logs, Findings& findings) {
+void check_number(const std::vector<DriveLog>& logs, DriveFindings& findings) {
   if (logs.size() >= 3) return;
   findings.warn(
       "recordings",
@@ -205,22 +151,44 @@ void check_number(const std::vector<DriveLog>& logs, Findings& findings) {
           logs.size(), logs.size() == 1 ? "recording" : "recordings"));
 }
 
-/// Two recordings of one command and one law.
+bool are_near(double a, double b) {
+  constexpr double kShare = 1e-3;
+  return std::abs(a - b) <= kShare * std::max(std::abs(a), std::abs(b));
+}
+
+/// The same load on the same drive, with the same sampling.
+bool is_same_setting(const DriveLog& a, const DriveLog& b) {
+  const JointLoad& load_a = a.load.load;
+  const JointLoad& load_b = b.load.load;
+  constexpr double kSameZero_rad = 1e-3;
+  return are_near(a.gain, b.gain) && are_near(a.speed_gain, b.speed_gain) &&
+         are_near(a.limit, b.limit) && are_near(a.supply_V, b.supply_V) &&
+         are_near(load_a.gravity_Nm, load_b.gravity_Nm) &&
+         are_near(load_a.inertia_kg_m2, load_b.inertia_kg_m2) &&
+         std::abs(load_a.zero_rad - load_b.zero_rad) <= kSameZero_rad &&
+         are_near(a.sample_period_s, b.sample_period_s);
+}
+
+/// One motion twice: the same command and the same times without power, in the same setting.
 bool is_repeat(const DriveLog& a, const DriveLog& b) {
-  if (a.gain != b.gain) return false;
+  if (!is_same_setting(a, b)) return false;
   const std::size_t count = std::min(a.size(), b.size());
   if (static_cast<double>(count) < 0.9 * static_cast<double>(std::max(a.size(), b.size())))
     return false;
   double difference = 0.0;
   double size = 0.0;
+  std::size_t switched = 0;
   for (std::size_t n = 0; n < count; ++n) {
+    if (is_powered(a, n) != is_powered(b, n)) ++switched;
     difference += (a.command[n] - b.command[n]) * (a.command[n] - b.command[n]);
     size += a.command[n] * a.command[n];
   }
-  return difference <= 1e-4 * size;
+  constexpr double kSwitchedShare = 0.02;  // A switch by hand is not at the same sample twice.
+  return difference <= 1e-4 * size &&
+         static_cast<double>(switched) <= kSwitchedShare * static_cast<double>(count);
 }
 
-void check_repeats(const std::vector<DriveLog>& logs, Findings& findings) {
+void check_repeats(const std::vector<DriveLog>& logs, DriveFindings& findings) {
   for (std::size_t i = 0; i < logs.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
       if (is_repeat(logs[i], logs[j])) return;
@@ -232,7 +200,7 @@ void check_repeats(const std::vector<DriveLog>& logs, Findings& findings) {
 }
 
 void check_temperature(const std::vector<Recording>& recordings, const std::vector<DriveLog>& logs,
-                       Findings& findings) {
+                       DriveFindings& findings) {
   std::map<double, std::pair<double, double>> range;  // by gain: lowest and highest mean
   for (std::size_t k = 0; k < recordings.size(); ++k) {
     const auto channel = std::ranges::find_if(recordings[k].channels(), [](const Channel& c) {
@@ -263,128 +231,23 @@ void check_temperature(const std::vector<Recording>& recordings, const std::vect
           std::abs(middles.back() - middles.front())));
 }
 
-/// Share of the supply that the back-EMF of the fitted motor takes.
-void check_speeds(const std::vector<DriveLog>& logs, const DriveIdentification& identified,
-                  Findings& findings) {
-  if (!has_winding(logs.front().kind)) return;
-  double speed = 0.0;
-  for (const DriveLog& log : logs) speed = std::max(speed, course_of(log).largest_speed_rad_s);
-  const double share =
-      at(identified.values, DriveParameter::torque_constant) * speed / logs.front().supply_V;
-  constexpr double kSlow = 0.1;
-  if (share < kSlow)
-    findings.warn(
-        "speed",
-        fmt::format(
-            "All motions are slow: the back-EMF reaches {:.1f} % of the supply, so that torque "
-            "constant and resistance are hardly separable. Record a fast motion.",
-            100.0 * share));
-}
-
-/// One frequency of a signal, its mean and ends taken out by a Hann window.
-double amplitude(std::span<const double> values, std::size_t stride, double phase_step) {
-  const std::size_t count = values.size() / stride;
-  double mean = 0.0;
-  for (std::size_t n = 0; n < count; ++n) mean += values[n * stride] / static_cast<double>(count);
-  std::complex<double> sum;
-  for (std::size_t n = 0; n < count; ++n) {
-    const auto at = static_cast<double>(n);
-    const double window =
-        0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * at / static_cast<double>(count));
-    sum += std::polar(window * (values[n * stride] - mean), -phase_step * at);
-  }
-  return std::abs(sum);
-}
-
-/// Where the measured angle is larger than the command and the fitted model's is not.
-struct MissedPeak {
-  double frequency_Hz = 0.0;
-  double measured = 0.0;  ///< angle over goal
-  double modelled = 0.0;
-};
-
-void find_peak(const DriveLog& log, const DriveIdentification& identified, MissedPeak& worst) {
-  DriveLanes lanes = DriveLanes::all(identified.values);
-  detail::AlignedVector<double> angles(log.size() * kDriveLanes);
-  roll_out(log, run_from(log, 0, log.size()), lanes, {identified.terms, identified.step_s},
-           {.angle_rad = angles.data()});
-  constexpr int kFrequencies = 40;
-  std::array<double, kFrequencies> command{};
-  const auto phase = [&](int k) {
-    const double frequency_Hz = 0.5 * std::pow(40.0, static_cast<double>(k) / (kFrequencies - 1));
-    return 2.0 * std::numbers::pi * frequency_Hz * log.sample_period_s;
-  };
-  for (int k = 0; k < kFrequencies; ++k) command[k] = amplitude(log.command, 1, phase(k));
-  // A frequency that the command hardly has shows nothing.
-  const double least = 0.3 * *std::ranges::max_element(command);
-  for (int k = 0; k < kFrequencies && phase(k) < 1.0; ++k) {
-    if (command[k] < least || least <= 0.0) continue;
-    const double measured = amplitude(log.angle_rad, 1, phase(k)) / command[k];
-    const double modelled = amplitude(angles, kDriveLanes, phase(k)) / command[k];
-    if (measured > 1.2 && measured - modelled > worst.measured - worst.modelled)
-      worst = {phase(k) / (2.0 * std::numbers::pi * log.sample_period_s), measured, modelled};
-  }
-}
-
-void check_peak(const std::vector<DriveLog>& logs, const DriveIdentification& identified,
-                Findings& findings) {
-  if (has(identified.terms, DriveTerm::spring)) return;
-  const CommandKind kind = logs.front().kind;
-  if (kind != CommandKind::goal_to_duty && kind != CommandKind::goal_to_torque) return;
-  MissedPeak worst;
-  for (const DriveLog& log : logs)
-    if (std::ranges::all_of(log.enabled, [](double on) { return on != 0.0; }))
-      find_peak(log, identified, worst);
-  constexpr double kMissed = 0.25;
-  if (worst.measured - worst.modelled <= kMissed * worst.measured || worst.measured == 0.0) return;
-  findings.warn(
-      "spring",
-      fmt::format(
-          "At {:.2g} Hz the angle is {:.2f} times the goal, in the model {:.2f} times: one mass "
-          "cannot do that. Try a spring between motor and load: --spring.",
-          worst.frequency_Hz, worst.measured, worst.modelled));
-}
-
 }  // namespace
 
 std::vector<DriveFinding> check_drive_logs(const std::vector<Recording>& recordings,
                                            const std::vector<DriveLog>& logs) {
-  Findings findings;
-  std::vector<Course> courses;
+  DriveFindings findings;
+  std::vector<DriveCourse> courses;
   courses.reserve(logs.size());
-  for (const DriveLog& log : logs) courses.push_back(course_of(log));
+  for (const DriveLog& log : logs) courses.push_back(drive_course(log));
   check_motors(recordings, findings);
   check_turns(logs, courses, findings);
   check_command(logs, courses, findings);
   check_load(logs, courses, findings);
-  check_saturation(logs, courses, findings);
+  if (!check_gear(logs, courses, findings)) check_saturation(courses, findings);
   check_passive(logs, courses, findings);
   check_number(logs, findings);
   check_temperature(recordings, logs, findings);
   check_repeats(logs, findings);
-  return findings.take();
-}
-
-std::vector<DriveFinding> check_identified(const std::vector<DriveLog>& logs,
-                                           const DriveIdentification& identified) {
-  Findings findings;
-  for (const IdentifiedDriveParameter& parameter : identified.parameters) {
-    const DriveParameterInfo& info = drive_parameter_info(parameter.parameter);
-    if (parameter.is_at_bound)
-      findings.warn(
-          "bound",
-          fmt::format(
-              "{} is at the bound of its range, {:.3g}: the recordings do not determine it, or the "
-              "load or the drive file is wrong.",
-              info.name, parameter.value));
-    else if (!parameter.is_determined)
-      findings.warn(
-          "not determined",
-          fmt::format("{} is not determined by these recordings: {:.3g} to {:.3g} with 95 %.",
-                      info.name, parameter.lowest, parameter.highest));
-  }
-  check_speeds(logs, identified, findings);
-  check_peak(logs, identified, findings);
   return findings.take();
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -38,14 +39,16 @@ DriveFileJson values_json(const DriveValues& values) {
 DriveFileJson parameters_json(const DriveIdentification& identified) {
   DriveFileJson list = DriveFileJson::array();
   for (const IdentifiedDriveParameter& parameter : identified.parameters)
-    list.push_back({{"name", drive_parameter_info(parameter.parameter).name},
-                    {"value", json_number(parameter.value)},
-                    {"standard_error", json_number(parameter.standard_error)},
-                    {"lowest_95", json_number(parameter.lowest)},
-                    {"highest_95", json_number(parameter.highest)},
-                    {"standard_error_from_load", json_number(parameter.from_load)},
-                    {"is_determined", parameter.is_determined},
-                    {"is_at_bound", parameter.is_at_bound}});
+    list.push_back(
+        {{"name", drive_parameter_info(parameter.parameter).name},
+         {"value", json_number(parameter.value)},
+         {"standard_error", json_number(parameter.standard_error)},
+         {"lowest_95", json_number(parameter.lowest)},
+         {"highest_95", json_number(parameter.highest)},
+         {"standard_error_from_load", json_number(parameter.from_load)},
+         {"is_determined", parameter.is_determined ? DriveFileJson(*parameter.is_determined)
+                                                   : DriveFileJson(nullptr)},
+         {"is_at_bound", parameter.is_at_bound}});
   return list;
 }
 
@@ -150,14 +153,16 @@ DriveValues values_from(const JsonObject& document, const DriveTerms& terms,
 }
 
 IdentifiedDriveParameter parameter_row(const JsonObject& row, const std::string& place) {
-  return {.parameter = parameter_from(row.text("name"), place + "/parameters"),
-          .value = row.number("value"),
-          .standard_error = row.number("standard_error"),
-          .lowest = row.number("lowest_95"),
-          .highest = row.number("highest_95"),
-          .from_load = row.number("standard_error_from_load"),
-          .is_determined = row.boolean("is_determined"),
-          .is_at_bound = row.boolean("is_at_bound")};
+  const bool has_interval = std::isfinite(row.number("standard_error"));
+  return {
+      .parameter = parameter_from(row.text("name"), place + "/parameters"),
+      .value = row.number("value"),
+      .standard_error = row.number("standard_error"),
+      .lowest = row.number("lowest_95"),
+      .highest = row.number("highest_95"),
+      .from_load = row.number("standard_error_from_load"),
+      .is_determined = has_interval ? std::optional(row.boolean("is_determined")) : std::nullopt,
+      .is_at_bound = row.boolean("is_at_bound")};
 }
 
 void read_results(const JsonObject& document, const std::string& place,

@@ -172,11 +172,12 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
   identified.step_s = drive_step_s(identified.terms, fit);
   identified.values = best_of_starts(all, identified, fit, options.threads).values;
   set_errors_of_fit(logs, fit, identified);
+  require_usable(check_free_runs(logs, identified, fit, options.threads));
   report_progress(options.progress, 0.5, "standard errors");
   identified.parameters =
       parameters_with_errors(logs, identified.terms, identified.values, options.has_standard_errors,
                              relative_error(identified.error_gain), fit, options.threads);
-  for (DriveFinding& finding : check_identified(logs, identified))
+  for (DriveFinding& finding : check_identified(recordings, logs, identified))
     identified.findings.push_back(std::move(finding));
   return identified;
 }

@@ -10,6 +10,7 @@
 #include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "report/identify.hpp"
+#include "torsio/joint_load/known_load.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio {
@@ -126,7 +127,7 @@ XyFigure intervals_figure(const DriveIdentification& identified, bool of_positiv
     values.x.push_back(parameter.value / unit);
     values.y.push_back(row);
     values.names.emplace_back(drive_parameter_info(parameter.parameter).name);
-    XySeries& intervals = parameter.is_determined ? determined : others;
+    XySeries& intervals = parameter.is_determined.value_or(true) ? determined : others;
     intervals.x.insert(intervals.x.end(),
                        {parameter.lowest / unit, parameter.highest / unit, kNotMeasured});
     intervals.y.insert(intervals.y.end(), {row, row, kNotMeasured});
@@ -136,19 +137,43 @@ XyFigure intervals_figure(const DriveIdentification& identified, bool of_positiv
   return figure;
 }
 
+double speed_rad_s(const DriveTrace& trace, std::size_t n) {
+  return n == 0 ? 0.0 : (trace.angle_rad[n] - trace.angle_rad[n - 1]) * trace.sample_rate_Hz;
+}
+
+/// The largest load of the friction in a free run, L of the equations of `DriveParameter`. With one mass it needs the
+/// motor's torque, which is that of the joint and the friction.
+double largest_load_Nm(const DriveIdentification& identified, const DriveRuns& run) {
+  const DriveTrace& trace = run.fitted;
+  const bool has_spring = has(identified.terms, DriveTerm::spring);
+  const JointLoad load = known_load(identified.load, *run.recording).load;
+  const double zero_rad = load.zero_rad + at(identified.values, DriveParameter::zero);
+  const double direction = at(identified.values, DriveParameter::direction);
+  double largest_Nm = 0.0;
+  for (std::size_t n = 0; n < trace.angle_rad.size(); ++n) {
+    const double joint_Nm = trace.joint_torque_Nm[n];
+    const double gravity_Nm = -load.gravity_Nm * std::sin(trace.joint_angle_rad[n] + zero_rad);
+    const auto load_of = [&](double motor_Nm) {
+      return std::abs(motor_Nm * (1.0 + direction) - gravity_Nm * (1.0 - direction));
+    };
+    const double speed = speed_rad_s(trace, n);
+    const double friction_Nm = drive_friction_Nm(identified.values, speed, load_of(joint_Nm));
+    const double motor_Nm = speed == 0.0 ? joint_Nm : joint_Nm + std::copysign(friction_Nm, speed);
+    largest_Nm = std::max(largest_Nm, has_spring ? std::abs(joint_Nm) : load_of(motor_Nm));
+  }
+  return largest_Nm;
+}
+
 /// Friction over the speeds of the recordings at four loads up to the largest one that the free runs have.
 XyFigure friction_figure(const DriveIdentification& identified,
                          const std::vector<DriveRuns>& runs) {
   double fastest_rad_s = 0.0;
   double largest_Nm = 0.0;
-  for (const DriveRuns& run : runs)
-    for (std::size_t n = 0; n < run.fitted.angle_rad.size(); ++n) {
-      largest_Nm = std::max(largest_Nm, std::abs(run.fitted.joint_torque_Nm[n]));
-      if (n > 0)
-        fastest_rad_s = std::max(fastest_rad_s,
-                                 std::abs(run.fitted.angle_rad[n] - run.fitted.angle_rad[n - 1]) *
-                                     run.fitted.sample_rate_Hz);
-    }
+  for (const DriveRuns& run : runs) {
+    largest_Nm = std::max(largest_Nm, largest_load_Nm(identified, run));
+    for (std::size_t n = 0; n < run.fitted.angle_rad.size(); ++n)
+      fastest_rad_s = std::max(fastest_rad_s, std::abs(speed_rad_s(run.fitted, n)));
+  }
   XyFigure figure{.title = "Largest friction over speed and load",
                   .x = {"speed [rad/s]", true},
                   .y = {"friction [Nm]"},
@@ -157,12 +182,12 @@ XyFigure friction_figure(const DriveIdentification& identified,
   constexpr std::array kShares{0.0, 0.25, 0.5, 1.0};
   for (const double share : kShares) {
     XySeries curve{
-        .label = fmt::format("at a load of {:.3g} Nm", share * largest_Nm), .x = {}, .y = {}};
+        .label = fmt::format("at a load L of {:.3g} Nm", share * largest_Nm), .x = {}, .y = {}};
     for (std::size_t k = 0; k < kPoints; ++k) {
       const double decades = 3.0 * (static_cast<double>(k) / (kPoints - 1) - 1.0);
-      const double speed_rad_s = fastest_rad_s * std::pow(10.0, decades);
-      curve.x.push_back(speed_rad_s);
-      curve.y.push_back(drive_friction_Nm(identified.values, speed_rad_s, share * largest_Nm));
+      const double speed = fastest_rad_s * std::pow(10.0, decades);
+      curve.x.push_back(speed);
+      curve.y.push_back(drive_friction_Nm(identified.values, speed, share * largest_Nm));
     }
     figure.series.push_back(std::move(curve));
   }
@@ -187,17 +212,19 @@ ReportSection parameters_section(const DriveIdentification& identified) {
   ReportSection section{
       .heading = "Parameters",
       .text =
-          "All quantities are after the gear. A parameter whose 95 % interval spans more than "
-          "a factor of 10 is not determined by these recordings. "
-          "docs/use/identify.md has the equations.",
+          "All quantities are after the gear. A positive parameter whose 95 % interval spans more "
+          "than a factor of 10, and another one whose interval spans more than half of its range, "
+          "is not determined by these recordings. docs/use/identify.md has the equations.",
       .tables = {
           numbered(report_table(drive_parameter_table(identified)), identified.parameters.size())}};
   for (const bool of_positive : {true, false}) {
     XyFigure figure = intervals_figure(identified, of_positive);
     if (!figure.series.empty()) section.figures.emplace_back(std::move(figure));
   }
-  if (section.figures.empty())
-    section.text += " There are no standard errors here, and so no intervals.";
+  if (!has_standard_errors(identified))
+    section.text +=
+        " There are no standard errors here, and so no intervals: it is not known which "
+        "parameters are determined.";
   return section;
 }
 
@@ -234,11 +261,45 @@ std::vector<std::string> summary_of(const DriveIdentification& identified) {
             : ""));
   std::string missing;
   for (const IdentifiedDriveParameter& parameter : identified.parameters)
-    if (!parameter.is_determined)
+    if (parameter.is_determined == false)
       missing += fmt::format("{}{}", missing.empty() ? "" : ", ",
                              drive_parameter_info(parameter.parameter).name);
   if (!missing.empty()) summary.push_back("Not determined: " + missing + ".");
+  if (!has_standard_errors(identified))
+    summary.push_back(
+        "Without standard errors it is not known which parameters these recordings determine.");
   return summary;
+}
+
+ReportSection errors_section(const DriveIdentification& identified) {
+  return {.heading = "Errors of the free runs",
+          .text =
+              "Mean |measured - simulated angle|. Held out: fitted without the recording's group; "
+              "nested: the terms were chosen without it, too.",
+          .tables = {numbered(report_table(drive_score_table(identified)),
+                              identified.recordings.size())},
+          .figures = {errors_figure(identified)},
+          .preformatted = is_evaluated(identified) ? drive_evaluation_text(identified)
+                                                   : identification_text(identified)};
+}
+
+void add_motions(const std::vector<DriveRuns>& runs, ReportDocument& document) {
+  constexpr std::size_t kDrawn = 30;
+  for (std::size_t k = 0; k < std::min(runs.size(), kDrawn); ++k)
+    document.sections.push_back(
+        {.heading = runs[k].recording->name(), .figures = {motion_figure(runs[k])}});
+  if (runs.size() > kDrawn)
+    document.sections.back().text =
+        fmt::format("The motions of {} more recordings are not drawn.", runs.size() - kDrawn);
+}
+
+void add_origins(const std::vector<Recording>& recordings, ReportDocument& document) {
+  for (const Recording& recording : recordings)
+    document.origin.emplace_back(
+        "recording " + recording.name(),
+        recording.source.sha256.empty()
+            ? "made in memory"
+            : recording.source.file + ", SHA-256 " + recording.source.sha256);
 }
 
 }  // namespace
@@ -253,35 +314,17 @@ ReportDocument identification_report(const DriveIdentification& identified,
                           .origin = {}};
   ReportSection findings = findings_section(identified, advice);
   if (!findings.tables.empty()) document.sections.push_back(std::move(findings));
-  document.sections.push_back(
-      {.heading = "Errors of the free runs",
-       .text = "Mean |measured - simulated angle|. Held out: fitted without the recording's group; "
-               "nested: the terms were chosen without it, too.",
-       .tables = {numbered(report_table(drive_score_table(identified)),
-                           identified.recordings.size())},
-       .figures = {errors_figure(identified)},
-       .preformatted = is_evaluated(identified) ? drive_evaluation_text(identified)
-                                                : identification_text(identified)});
+  document.sections.push_back(errors_section(identified));
   document.sections.push_back(parameters_section(identified));
   document.sections.push_back(
       {.heading = "Friction",
        .text = "The largest torque of the friction in steady motion. The load is L of the "
-               "equations, up to the largest torque of the joint in these recordings.",
+               "equations, up to the largest one in these recordings: with one mass about twice "
+               "the torque of the load, since the motor's torque counts in it, too.",
        .figures = {friction_figure(identified, runs)}});
   if (!identified.trials.empty()) document.sections.push_back(structures_section(identified));
-  constexpr std::size_t kDrawn = 30;
-  for (std::size_t k = 0; k < std::min(runs.size(), kDrawn); ++k)
-    document.sections.push_back(
-        {.heading = runs[k].recording->name(), .figures = {motion_figure(runs[k])}});
-  if (runs.size() > kDrawn)
-    document.sections.back().text =
-        fmt::format("The motions of {} more recordings are not drawn.", runs.size() - kDrawn);
-  for (const Recording& recording : recordings)
-    document.origin.emplace_back(
-        "recording " + recording.name(),
-        recording.source.sha256.empty()
-            ? "made in memory"
-            : recording.source.file + ", SHA-256 " + recording.source.sha256);
+  add_motions(runs, document);
+  add_origins(recordings, document);
   return document;
 }
 

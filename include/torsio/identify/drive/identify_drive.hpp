@@ -51,7 +51,7 @@ struct IdentifiedDriveParameter {
       kNotMeasured;  ///< end of the 95 % interval: Student's t, on the logarithm of a positive parameter
   double highest = kNotMeasured;
   double from_load = 0.0;  ///< the part of the standard error that the load's errors cause
-  bool is_determined = true;
+  std::optional<bool> is_determined = {};  ///< by the interval; empty: not known, without one
   bool is_at_bound = false;
 };
 
@@ -128,8 +128,10 @@ struct DriveAdvice {
   double standard_error_ratio = 1.0;     ///< after it over before
 };
 
-/// Candidates by how much they lower one standard error: a passive release, a second mass, a gain between those that were
-/// used, a repeat. Each is simulated with the identified drive; its derivatives are added to those of the recordings.
+/// Candidates by how much they lower one standard error: a passive release, where no recording has a motion without power,
+/// a second mass, a gain between those that were used, a repeat. Each is simulated with the identified drive; its
+/// derivatives are added to those of the recordings.
+/// @throws Error if there are no recordings, or one cannot be used.
 [[nodiscard]] std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
                                                     const std::vector<Recording>& recordings);
 
