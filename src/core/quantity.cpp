@@ -14,11 +14,15 @@ double signed_quantity_with_unit(std::string_view text, std::string_view expecte
   const std::string_view all = trimmed(text);
   double number = 0.0;
   const auto [end, code] = std::from_chars(all.data(), all.data() + all.size(), number);
-  if (code == std::errc{} && end == all.data() + all.size())
+  const bool is_bare = code == std::errc{} && end == all.data() + all.size();
+  const bool is_same_in_each_unit = expected_si == "1" || (number == 0.0 && expected_si != "K");
+  if (is_bare && !is_same_in_each_unit)
     throw UsageError(
         {.place = std::string(place),
-         .expected = "a number with its unit, a multiple of " + std::string(expected_si),
-         .found = "'" + std::string(text) + "'"});
+         .expected =
+             "a number with its unit, " + std::string(expected_si) + " or another of the quantity",
+         .found = "'" + std::string(text) + "'",
+         .advice = "Write " + std::string(all) + std::string(expected_si) + " if that is meant."});
   return si_quantity(text, expected_si, place);
 }
 

@@ -36,6 +36,16 @@ TEST_F(BrokenCalls, OfTheCommandLineExitWithTwo) {
   EXPECT_EQ(torsio("check").exit_code, kCallWasWrong);
 }
 
+TEST_F(BrokenCalls, HaveAQuantityWithoutItsUnit) {
+  expect_error(torsio("simulate dfki-50 sweep --lever 0.17 -o x.csv"), kCallWasWrong,
+               "Write 0.17m if that is meant");
+  expect_error(torsio("simulate dfki-50 sweep --duration 10 -o x.csv"), kCallWasWrong, "10s");
+  expect_error(torsio("track --duration 10"), kCallWasWrong, "10s");
+  expect_error(torsio("design rubber-spring --torque 0.5 --angle 15deg"), kCallWasWrong, "0.5Nm");
+  expect_error(torsio("monitor --actuator dfki-50 --inject gear_angle=1@2s"), kCallWasWrong,
+               "1rad");
+}
+
 TEST_F(BrokenCalls, NameTheNearestOfWhatThereIs) {
   const auto suggests = [this](const std::string& call, const std::string& right) {
     expect_error(torsio(call), kCallWasWrong, "Did you mean '" + right + "'?");

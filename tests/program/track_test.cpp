@@ -88,8 +88,8 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
   expect_error(torsio("track --friction nan"), kCallWasWrong, "--friction: expected a share");
   expect_error(torsio("track --observer 0Hz"), kCallWasWrong, "--observer: expected");
   expect_error(torsio("track --observer 400Hz"), kWorkFailed, "phase margin, found -");
-  expect_error(torsio("track --limits position=1..2"), kCallWasWrong, "not between the limits");
-  expect_error(torsio("track --limits speed=1,speed=2"), kCallWasWrong, "speed is given twice");
+  expect_error(torsio("track --limits position=1rad..2rad"), kCallWasWrong, "not between the limits");
+  expect_error(torsio("track --limits speed=1rad_s,speed=2rad_s"), kCallWasWrong, "speed is given twice");
   expect_error(torsio("track --limits torque=5Nm"), kCallWasWrong, "unknown limit 'torque=5Nm'");
   expect_error(torsio("track --limits position=0.0001rad"), kWorkFailed, "no room between");
   expect_error(torsio("track --velocity-bandwidth 50rad_s"), kCallWasWrong, "--acts-on velocity");
@@ -100,7 +100,7 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
                "up to 200 rad/s");
   expect_error(torsio("track --limits speed=100rad_s"), kCallWasWrong,
                "up to the rated 1.658 rad/s");
-  expect_error(torsio("track --limits position=0.3..-0.1"), kCallWasWrong,
+  expect_error(torsio("track --limits position=0.3rad..-0.1rad"), kCallWasWrong,
                "lower limit comes first");
   expect_error(torsio("track --limits ''"), kCallWasWrong, "expected a value, found an empty text");
   expect_error(torsio("track --record ''"), kCallWasWrong, "--record");

@@ -10,6 +10,7 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -120,9 +121,9 @@ void calibrate_arm(ArmCalibrateFlags& flags) {
   torsio::CalibrationOptions options{.weight_share = 0.01 * flags.weight_within_percent,
                                      .link_share = 0.01 * flags.links_within_percent};
   if (!flags.links_com.empty())
-    options.link_com_m = torsio::si_quantity(flags.links_com, "m", "--links-com");
+    options.link_com_m = torsio::signed_quantity_with_unit(flags.links_com, "m", "--links-com");
   if (!flags.attachment.empty())
-    options.attachment_m = torsio::si_quantity(flags.attachment, "m", "--attachment");
+    options.attachment_m = torsio::signed_quantity_with_unit(flags.attachment, "m", "--attachment");
   ProgressBar progress;
   const std::vector<torsio::CalibratedJoint> joints =
       torsio::calibrate_joints(calibration_motions(given, progress.listener()), options);

@@ -7,6 +7,7 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "torsio/arm/contacts_file.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/report/text_table.hpp"
@@ -25,10 +26,11 @@ void ArmSource::add(CLI::App& verb) {
 torsio::ArmSetup ArmSource::setup(const torsio::Progress& progress) const {
   torsio::ArmSetup setup = arm_of(arm, progress);
   if (!tilt.empty())
-    setup.arm.gravity_m_s2 = torsio::tilted_gravity(torsio::si_quantity(tilt, "rad", "--tilt"));
+    setup.arm.gravity_m_s2 =
+        torsio::tilted_gravity(torsio::signed_quantity_with_unit(tilt, "rad", "--tilt"));
   if (!payload.empty()) {
     // The centre of mass stays; the inertia is that of a body of the same shape.
-    const double mass_kg = torsio::si_quantity(payload, "kg", "--payload");
+    const double mass_kg = torsio::signed_quantity_with_unit(payload, "kg", "--payload");
     torsio::BodyInertia& body = setup.arm.payload;
     const double scale = body.mass_kg > 0.0 ? mass_kg / body.mass_kg : 0.0;
     for (double& moment : body.inertia_kg_m2) moment *= scale;

@@ -9,6 +9,7 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -58,12 +59,12 @@ void excite(ExciteFlags& flags) {
   if (flags.goal == "springs") flags.spec.goal = torsio::ExcitationGoal::springs;
   flags.spec.range_share = 0.01 * flags.range_percent;
   if (!flags.height.empty())
-    flags.spec.lowest_height_m = torsio::si_quantity(flags.height, "m", "--height");
+    flags.spec.lowest_height_m = torsio::signed_quantity_with_unit(flags.height, "m", "--height");
   ProgressBar progress;
   torsio::ArmSetup setup = arm_of(flags.arm, progress.listener());
   if (!flags.tilt.empty())
     setup.arm.gravity_m_s2 =
-        torsio::tilted_gravity(torsio::si_quantity(flags.tilt, "rad", "--tilt"));
+        torsio::tilted_gravity(torsio::signed_quantity_with_unit(flags.tilt, "rad", "--tilt"));
   const torsio::ExcitingProgram planned =
       torsio::exciting_program(setup, flags.spec, progress.listener());
   write_text(flags.output, torsio::program_yaml(planned.program));

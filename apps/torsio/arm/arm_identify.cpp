@@ -15,6 +15,7 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -81,8 +82,9 @@ torsio::IdentificationOptions options_of(const IdentifyFlags& flags,
                                         .torque_floor_share = 0.002 * torque_percent,
                                         .link_share = 0.01 * flags.links_within_percent};
   if (!flags.links_com.empty())
-    options.link_com_m = torsio::si_quantity(flags.links_com, "m", "--links-com");
-  if (!flags.window.empty()) options.window_s = torsio::si_quantity(flags.window, "s", "--window");
+    options.link_com_m = torsio::signed_quantity_with_unit(flags.links_com, "m", "--links-com");
+  if (!flags.window.empty())
+    options.window_s = torsio::signed_quantity_with_unit(flags.window, "s", "--window");
   // A model that was trained with a load cell contains the friction of the bearing.
   for (const torsio::ArmJointSetup& joint : setup.joints) {
     options.dry_Nm.push_back(has_linear_spring(joint) ? joint.sheet.joint.bearing_friction_Nm.value
@@ -276,7 +278,7 @@ void identify(IdentifyFlags& flags) {
   data.check_outputs({flags.output, flags.json.destination}, setup.files);
   if (!flags.tilt.empty())
     setup.arm.gravity_m_s2 =
-        torsio::tilted_gravity(torsio::si_quantity(flags.tilt, "rad", "--tilt"));
+        torsio::tilted_gravity(torsio::signed_quantity_with_unit(flags.tilt, "rad", "--tilt"));
   const std::vector<torsio::ArmMotion> motions =
       motions_of(flags.recordings, setup.arm, progress.listener());
   if (flags.has_links) return identify_links_of(flags, setup, motions, progress.listener());

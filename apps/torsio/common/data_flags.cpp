@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "common/output.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
@@ -55,8 +56,9 @@ double angular_frequency_rad_s(const std::string& text, const char* option) {
   std::string in_words = text;
   if (text.ends_with(kSlash)) in_words.replace(text.size() - kSlash.size(), kSlash.size(), "rad_s");
   if (in_words.ends_with("rad_s"))
-    return above_zero(torsio::si_quantity(in_words, "rad_s", option), option);
-  return 2.0 * std::numbers::pi * above_zero(torsio::si_quantity(text, "Hz", option), option);
+    return above_zero(torsio::signed_quantity_with_unit(in_words, "rad_s", option), option);
+  return 2.0 * std::numbers::pi *
+         above_zero(torsio::signed_quantity_with_unit(text, "Hz", option), option);
 }
 
 std::vector<std::string_view> families_beyond_all() {
@@ -176,7 +178,7 @@ torsio::LoadOptions DataFlags::load_options(const torsio::Progress& progress) co
                               .advice = "Give one with --mapping FILE."});
   options.default_mapping = model_mapping_;
   options.default_mapping_place = model_mapping_place_;
-  if (!rate.empty()) options.rate_Hz = torsio::si_quantity(rate, "Hz", "--rate");
+  if (!rate.empty()) options.rate_Hz = torsio::signed_quantity_with_unit(rate, "Hz", "--rate");
   options.target = target;
   options.computes_target = !load_file.empty();
   options.joint = joint;

@@ -15,6 +15,7 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "control/track_impedance.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
@@ -119,9 +120,10 @@ torsio::TorqueReference reference_of(const TrackFlags& flags, const std::vector<
     check_replayed(flags.replayed, reference);
   }
   if (!flags.amplitude.empty())
-    reference.amplitude_Nm = torsio::si_quantity(flags.amplitude, "Nm", "--amplitude");
+    reference.amplitude_Nm =
+        torsio::signed_quantity_with_unit(flags.amplitude, "Nm", "--amplitude");
   if (!flags.duration.empty())
-    reference.duration_s = torsio::si_quantity(flags.duration, "s", "--duration");
+    reference.duration_s = torsio::signed_quantity_with_unit(flags.duration, "s", "--duration");
   return reference;
 }
 
@@ -147,15 +149,18 @@ torsio::DriveLimits limits_of(const std::string& text) {
     if (!given.insert(name).second) refuse(name + " is given twice");
     const std::string value = part.substr(equals + 1);
     if (name == "speed") {
-      limits.speed_rad_s =
-          above_zero(torsio::si_quantity(value, "rad_s", "--limits speed"), "--limits speed");
+      limits.speed_rad_s = above_zero(
+          torsio::signed_quantity_with_unit(value, "rad_s", "--limits speed"), "--limits speed");
     } else if (const std::size_t dots = value.find(".."); dots == std::string::npos) {
       limits.highest_rad =
-          above_zero(torsio::si_quantity(value, "rad", "--limits position"), "--limits position");
+          above_zero(torsio::signed_quantity_with_unit(value, "rad", "--limits position"),
+                     "--limits position");
       limits.lowest_rad = -limits.highest_rad;
     } else {
-      limits.lowest_rad = torsio::si_quantity(value.substr(0, dots), "rad", "--limits position");
-      limits.highest_rad = torsio::si_quantity(value.substr(dots + 2), "rad", "--limits position");
+      limits.lowest_rad =
+          torsio::signed_quantity_with_unit(value.substr(0, dots), "rad", "--limits position");
+      limits.highest_rad =
+          torsio::signed_quantity_with_unit(value.substr(dots + 2), "rad", "--limits position");
       if (!(limits.lowest_rad < limits.highest_rad))
         refuse("position: the lower limit comes first, found '" + value + "'");
       if (!(limits.lowest_rad < 0.0 && limits.highest_rad > 0.0))
@@ -196,7 +201,7 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedMod
       throw torsio::UsageError({.place = "--lever",
                                 .problem = "the output is locked",
                                 .advice = "Give --output free, too."});
-    spec.lever_m = torsio::si_quantity(flags.lever, "m", "--lever");
+    spec.lever_m = torsio::signed_quantity_with_unit(flags.lever, "m", "--lever");
   }
   if (!flags.bandwidth.empty())
     spec.bandwidth_rad_s = angular_frequency_rad_s(flags.bandwidth, "--bandwidth");
@@ -206,8 +211,8 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedMod
                               .found = fmt::format("{}", flags.friction)});
   if (flags.friction != 0.0) spec.friction = {.share = flags.friction};
   if (!flags.observer.empty())
-    spec.observer_cutoff_Hz =
-        above_zero(torsio::si_quantity(flags.observer, "Hz", "--observer"), "--observer");
+    spec.observer_cutoff_Hz = above_zero(
+        torsio::signed_quantity_with_unit(flags.observer, "Hz", "--observer"), "--observer");
   if (!flags.limits.empty()) spec.limits = limits_of(flags.limits);
   check_velocity_loop(flags);
   if (flags.acts_on == "velocity")

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
@@ -17,7 +18,7 @@ using torsio::ImpedanceSpec;
 
 double stiffness_of(const std::string& text) {
   try {
-    return torsio::si_quantity(text, "Nm_rad", "--impedance");
+    return torsio::signed_quantity_with_unit(text, "Nm_rad", "--impedance");
   } catch (const torsio::UsageError& error) {
     torsio::ErrorReport report = error.report();
     report.expected = "high, zero or a stiffness such as 2000Nm_rad";
@@ -34,7 +35,7 @@ ImpedanceSpec spec_of(const ImpedanceFlags& flags, const SharedTrackFlags& share
     spec.stiffness_Nm_rad = stiffness_of(flags.impedance);
   }
   const auto set = [](double& value, const std::string& text, const char* unit, const char* flag) {
-    if (!text.empty()) value = torsio::si_quantity(text, unit, flag);
+    if (!text.empty()) value = torsio::signed_quantity_with_unit(text, unit, flag);
   };
   set(spec.damping_Nms_rad, flags.damping, "Nms_rad", "--impedance-damping");
   set(spec.torque_gain_Nm_rad, flags.torque_gain, "Nm_rad", "--torque-gain");

@@ -11,6 +11,7 @@
 
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
+#include "core/quantity.hpp"
 #include "report/json_text.hpp"
 #include "torsio/actuator/controller_file.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
@@ -69,8 +70,8 @@ Tuned tuned(const TuneFlags& flags) {
   settings.joint.joint_inertia_kg_m2 += flags.load_inertia_kg_m2;
   torsio::TorqueLoopCore::Settings loop{.deflection = settings};
   if (!flags.observer.empty())
-    loop.observer_cutoff_Hz =
-        above_zero(torsio::si_quantity(flags.observer, "Hz", "--observer"), "--observer");
+    loop.observer_cutoff_Hz = above_zero(
+        torsio::signed_quantity_with_unit(flags.observer, "Hz", "--observer"), "--observer");
   const torsio::TorqueLoopCore core(loop, kRate_Hz);
   const torsio::DeflectionController& controller = core.deflection();
   return {.controller = controller,
@@ -191,9 +192,9 @@ torsio::ControllerFile controller_of(const TuneFlags& flags, const Tuned& loop) 
       .stop = torsio::joint_stop_settings(sheet, flags.load_Nm)};
   torsio::JointCascade::Limits& limits = file.settings.limits;
   if (!flags.lowest.empty())
-    limits.lowest_rad = torsio::si_quantity(flags.lowest, "rad", "--lowest-angle");
+    limits.lowest_rad = torsio::signed_quantity_with_unit(flags.lowest, "rad", "--lowest-angle");
   if (!flags.highest.empty())
-    limits.highest_rad = torsio::si_quantity(flags.highest, "rad", "--highest-angle");
+    limits.highest_rad = torsio::signed_quantity_with_unit(flags.highest, "rad", "--highest-angle");
   return file;
 }
 

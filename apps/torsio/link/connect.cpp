@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/data_flags.hpp"
+#include "core/quantity.hpp"
 #include "link/connect_flags.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
@@ -56,7 +57,8 @@ std::string range_text(const JointConnection::Register& each) {
 
 void list(const RegisterFlags& flags) {
   const std::shared_ptr<torsio::LinkTransport> line = torsio::open_joint_line(flags.line);
-  const double wait_s = above_zero(torsio::si_quantity(flags.wait, "s", "--wait"), "--wait");
+  const double wait_s =
+      above_zero(torsio::signed_quantity_with_unit(flags.wait, "s", "--wait"), "--wait");
   torsio::TextTable table;
   table.header({"id", "name", "actuator", "serial", "state", "version"});
   Json joints = Json::array();

@@ -11,6 +11,7 @@
 #include "common/data_flags.hpp"
 #include "common/interrupt.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "files/whole_file.hpp"
 #include "link/connect_flags.hpp"
 #include "report/json_text.hpp"
@@ -108,13 +109,13 @@ void add_data_verbs(CLI::App& connect) {
   verb->add_option("--value", zero->value, "in the unit of the channel")->capture_default_str();
   zero->add(*verb);
   auto fault = std::make_shared<CommandFlags>();
-  verb =
-      add_command(connect, "fault", "inject a fault into a simulated joint; without a name all end",
-                  "fault freeze --channel joint_angle_rad --joint 3", fault,
-                  [](const CommandFlags& flags, JointConnection& connection) {
-                    connection.inject_fault(flags.file, flags.channel, flags.value,
-                                            torsio::si_quantity(flags.duration, "s", "--for"));
-                  });
+  verb = add_command(
+      connect, "fault", "inject a fault into a simulated joint; without a name all end",
+      "fault freeze --channel joint_angle_rad --joint 3", fault,
+      [](const CommandFlags& flags, JointConnection& connection) {
+        connection.inject_fault(flags.file, flags.channel, flags.value,
+                                torsio::signed_quantity_with_unit(flags.duration, "s", "--for"));
+      });
   verb->add_option("NAME", fault->file, "name of the fault");
   verb->add_option("--channel", fault->channel, "channel of the telemetry");
   verb->add_option("--magnitude", fault->value, "in the unit of the fault")->capture_default_str();

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "common/data_flags.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -78,7 +79,7 @@ void ConnectFlags::add_bridge(CLI::App& verb) {
 }
 
 double ConnectFlags::bridge_s() const {
-  const double longest_s = torsio::si_quantity(bridge, "s", "--bridge");
+  const double longest_s = torsio::signed_quantity_with_unit(bridge, "s", "--bridge");
   if (!(longest_s >= 0.0) || longest_s > 1.0)
     throw torsio::UsageError({.place = "--bridge", .expected = "0s to 1s", .found = bridge});
   return longest_s;
@@ -95,7 +96,8 @@ torsio::JointConnection::Settings ConnectFlags::settings() const {
   return {.id = static_cast<std::uint8_t>(id),
           .joint = static_cast<std::uint8_t>(joint),
           .rules = is_lenient ? torsio::NdlcomRules::lenient : torsio::NdlcomRules::strict,
-          .timeout_s = above_zero(torsio::si_quantity(timeout, "s", "--timeout"), "--timeout")};
+          .timeout_s = above_zero(torsio::signed_quantity_with_unit(timeout, "s", "--timeout"),
+                                  "--timeout")};
 }
 
 torsio::JointConnection ConnectFlags::connection() const { return {line, settings()}; }

@@ -19,6 +19,7 @@
 
 #include "common/data_flags.hpp"
 #include "common/interrupt.hpp"
+#include "core/quantity.hpp"
 #include "link/connect_flags.hpp"
 #include "link/page_models.hpp"
 #include "link/telemetry_file.hpp"
@@ -53,7 +54,7 @@ struct PageFlags : ConnectFlags {
 
   [[nodiscard]] double duration_s() const {
     if (duration.empty()) return std::numeric_limits<double>::infinity();
-    return above_zero(torsio::si_quantity(duration, "s", "--for"), "--for");
+    return above_zero(torsio::signed_quantity_with_unit(duration, "s", "--for"), "--for");
   }
 };
 
@@ -324,8 +325,9 @@ void run(const PageFlags& flags) {
                                         .joints = joint_ids(flags.joints),
                                         .rules = line.rules,
                                         .timeout_s = line.timeout_s});
-  group.subscribe(flags.channels,
-                  above_zero(torsio::si_quantity(flags.rate, "Hz", "--rate"), "--rate"));
+  group.subscribe(
+      flags.channels,
+      above_zero(torsio::signed_quantity_with_unit(flags.rate, "Hz", "--rate"), "--rate"));
   for (std::size_t j = 0; j < group.size(); ++j) {
     const auto& subscription = group.subscription(j);
     if (TelemetryFile::recorded(subscription.channels) != subscription.channels)

@@ -13,6 +13,7 @@
 #include "common/data_flags.hpp"
 #include "common/interrupt.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "link/connect_flags.hpp"
 #include "link/telemetry_file.hpp"
 #include "report/json_text.hpp"
@@ -225,7 +226,8 @@ void run(const PlayFlags& flags) {
   const auto visit = [&](const torsio::LinkTelemetry& telemetry) {
     if (file) file->add(telemetry);
   };
-  const double valid_s = above_zero(torsio::si_quantity(flags.valid, "s", "--valid"), "--valid");
+  const double valid_s =
+      above_zero(torsio::signed_quantity_with_unit(flags.valid, "s", "--valid"), "--valid");
   const Played played = play(joint, references, valid_s, visit);
   lift_interrupt_deadline();
   stop_and_disable(joint, visit);

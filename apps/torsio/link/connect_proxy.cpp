@@ -10,6 +10,7 @@
 
 #include "common/data_flags.hpp"
 #include "common/interrupt.hpp"
+#include "core/quantity.hpp"
 #include "link/connect_flags.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/units.hpp"
@@ -67,8 +68,9 @@ std::string counts_text(const char* direction, const HostileWire::Counts& counts
 }
 
 void run(ProxyFlags& flags) {
-  flags.wire.usual_delay_s = torsio::si_quantity(flags.usual_delay, "s", "--delay");
-  flags.wire.longest_delay_s = torsio::si_quantity(flags.longest_delay, "s", "--longest-delay");
+  flags.wire.usual_delay_s = torsio::signed_quantity_with_unit(flags.usual_delay, "s", "--delay");
+  flags.wire.longest_delay_s =
+      torsio::signed_quantity_with_unit(flags.longest_delay, "s", "--longest-delay");
   HostileWire to_joints(flags.wire, flags.seed);
   HostileWire to_hosts(flags.wire, flags.seed + 1);
   const auto joints = torsio::open_joint_line(flags.line);
@@ -77,7 +79,7 @@ void run(ProxyFlags& flags) {
   const double duration_s =
       flags.duration.empty()
           ? std::numeric_limits<double>::infinity()
-          : above_zero(torsio::si_quantity(flags.duration, "s", "--for"), "--for");
+          : above_zero(torsio::signed_quantity_with_unit(flags.duration, "s", "--for"), "--for");
   remark(fmt::format("from {} to {}, until it is interrupted", hosts->place(), name(flags.line)));
   const std::int64_t start_ns = clock.now_ns();
   while (!is_interrupted() && 1e-9 * static_cast<double>(clock.now_ns() - start_ns) < duration_s) {

@@ -17,6 +17,7 @@
 
 #include "common/data_flags.hpp"
 #include "common/interrupt.hpp"
+#include "core/quantity.hpp"
 #include "link/connect_flags.hpp"
 #include "live/wall_time.hpp"
 #include "report/json_text.hpp"
@@ -50,7 +51,7 @@ struct PublishFlags : ConnectFlags {
 
   [[nodiscard]] double duration_s() const {
     if (duration.empty()) return std::numeric_limits<double>::infinity();
-    return above_zero(torsio::si_quantity(duration, "s", "--for"), "--for");
+    return above_zero(torsio::signed_quantity_with_unit(duration, "s", "--for"), "--for");
   }
 };
 
@@ -124,8 +125,9 @@ class Publishing {
         topics_(topics(joints_)),
         times_(joints_.size()),
         was_silent_(joints_.size()) {
-    joints_.subscribe(flags.channels,
-                      above_zero(torsio::si_quantity(flags.rate, "Hz", "--rate"), "--rate"));
+    joints_.subscribe(
+        flags.channels,
+        above_zero(torsio::signed_quantity_with_unit(flags.rate, "Hz", "--rate"), "--rate"));
     torsio::TelemetryPublisher::Settings settings;
     for (std::size_t n = 0; n < joints_.size(); ++n)
       settings.joints.push_back({.name = topics_[n], .channels = joints_.subscription(n).channels});

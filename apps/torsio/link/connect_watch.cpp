@@ -10,6 +10,7 @@
 
 #include "common/data_flags.hpp"
 #include "common/interrupt.hpp"
+#include "core/quantity.hpp"
 #include "link/connect_flags.hpp"
 #include "link/telemetry_file.hpp"
 #include "report/json_text.hpp"
@@ -43,11 +44,11 @@ struct TelemetryFlags : ConnectFlags {
     add(verb);
   }
   [[nodiscard]] double rate_Hz() const {
-    return above_zero(torsio::si_quantity(rate, "Hz", "--rate"), "--rate");
+    return above_zero(torsio::signed_quantity_with_unit(rate, "Hz", "--rate"), "--rate");
   }
   [[nodiscard]] double duration_s() const {
     if (duration.empty()) return std::numeric_limits<double>::infinity();
-    return above_zero(torsio::si_quantity(duration, "s", "--for"), "--for");
+    return above_zero(torsio::signed_quantity_with_unit(duration, "s", "--for"), "--for");
   }
 };
 

@@ -17,6 +17,7 @@
 #include "common/interrupt.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "link/joint_flags.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
@@ -229,7 +230,8 @@ JointJson run_json(const JointFlags& flags, const Cycles& done, const torsio::Jo
 
 std::int64_t cycles_of(const std::string& duration) {
   if (duration.empty()) return 0;
-  const double s = above_zero(torsio::si_quantity(duration, "s", "--duration"), "--duration");
+  const double s =
+      above_zero(torsio::signed_quantity_with_unit(duration, "s", "--duration"), "--duration");
   constexpr double kLongest_s = 1e9;
   if (s > kLongest_s)
     throw torsio::UsageError(
@@ -244,10 +246,10 @@ void run(const JointFlags& flags, const CLI::App& verb) {
                               .found = "one of them"});
   DataFlags().check_outputs({flags.json.destination}, {flags.served.faults});
   const std::int64_t cycles = cycles_of(flags.duration);
-  const double watchdog_s = torsio::si_quantity(flags.watchdog, "s", "--watchdog");
+  const double watchdog_s = torsio::signed_quantity_with_unit(flags.watchdog, "s", "--watchdog");
   ProgressBar progress;
   std::vector<torsio::ServedArm> arms = flags.served.arms(progress.listener());
-  const double can_rate_Hz = torsio::si_quantity(flags.can_rate, "Hz", "--can-rate");
+  const double can_rate_Hz = torsio::signed_quantity_with_unit(flags.can_rate, "Hz", "--can-rate");
   if (verb.get_option("--can-rate")->count() > 0 && flags.line.can.empty())
     throw torsio::UsageError({.place = "--can-rate", .expected = "--can", .found = "none"});
   const std::unique_ptr<torsio::LinkTransport> transport = flags.line.open(verb);

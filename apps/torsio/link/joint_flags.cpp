@@ -10,6 +10,7 @@
 #include "arm/arm_verbs.hpp"
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
@@ -146,8 +147,10 @@ void ServedJointFlags::add(CLI::App& verb) {
 std::vector<torsio::ServedArm> ServedJointFlags::single_joints(
     const torsio::Progress& progress) const {
   torsio::SingleLink link{.has_vertical_axis = has_vertical_axis};
-  if (!link_mass.empty()) link.mass_kg = torsio::si_quantity(link_mass, "kg", "--link-mass");
-  if (!link_length.empty()) link.length_m = torsio::si_quantity(link_length, "m", "--link-length");
+  if (!link_mass.empty())
+    link.mass_kg = torsio::signed_quantity_with_unit(link_mass, "kg", "--link-mass");
+  if (!link_length.empty())
+    link.length_m = torsio::signed_quantity_with_unit(link_length, "m", "--link-length");
   std::vector<torsio::ServedArm> arms;
   unsigned next_id = 1;
   for (const std::string& text : joints.empty() ? std::vector<std::string>{"dfki-50"} : joints) {

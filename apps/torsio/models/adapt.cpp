@@ -5,6 +5,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "core/quantity.hpp"
 #include "report/adaptation.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -45,7 +46,7 @@ torsio::Dataset load(const AdaptFlags& flags, const torsio::ModelFile& file,
   torsio::Dataset dataset = data.load({}, flags.test, progress);
   if (!dataset.has_role(torsio::Role::test))
     torsio::hold_out_ends(dataset, flags.held_out,
-                          torsio::si_quantity(flags.embargo, "s", "--embargo"));
+                          torsio::signed_quantity_with_unit(flags.embargo, "s", "--embargo"));
   return dataset;
 }
 

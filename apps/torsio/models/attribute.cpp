@@ -5,6 +5,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/attribution.hpp"
@@ -28,7 +29,7 @@ struct AttributeFlags {
 /// 0: found from the model.
 std::size_t window_samples(const AttributeFlags& flags, double sample_rate_Hz) {
   if (flags.window == "auto") return 0;
-  const double window_s = torsio::si_quantity(flags.window, "s", "--window");
+  const double window_s = torsio::signed_quantity_with_unit(flags.window, "s", "--window");
   const double samples = std::round(window_s * sample_rate_Hz);
   if (!(samples >= 1.0 && samples <= 1e9))
     throw torsio::UsageError({.place = "--window",

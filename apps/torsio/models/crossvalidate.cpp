@@ -9,6 +9,7 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "common/report_text.hpp"
+#include "core/quantity.hpp"
 #include "report/cross_validation.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -64,9 +65,10 @@ void warn_of_other_motions_in_folds(torsio::Dataset dataset, const torsio::Featu
 void run(CrossValidateFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot});
-  const torsio::FoldScheme scheme{.folds = flags.folds,
-                                  .embargo_s = torsio::si_quantity(flags.embargo, "s", "--embargo"),
-                                  .by = flags.by};
+  const torsio::FoldScheme scheme{
+      .folds = flags.folds,
+      .embargo_s = torsio::signed_quantity_with_unit(flags.embargo, "s", "--embargo"),
+      .by = flags.by};
   ProgressBar progress;
   torsio::Dataset dataset = flags.data.load({}, {}, progress.listener());
   const auto choices = choices_of(flags, settings, dataset);

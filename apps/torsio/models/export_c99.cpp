@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/quantity.hpp"
 #include "files/output_file.hpp"
 #include "models/export_flags.hpp"
 #include "torsio/core/error.hpp"
@@ -32,7 +33,8 @@ torsio::CCounts counts_of(const std::string& text) {
                               .expected = "CHANNEL=COUNTS_PER_TURN, such as gear_angle_rad=524288",
                               .found = text});
   return {.channel = text.substr(0, equals),
-          .counts_per_turn = torsio::si_quantity(text.substr(equals + 1), "1", "--counts")};
+          .counts_per_turn =
+              torsio::signed_quantity_with_unit(text.substr(equals + 1), "1", "--counts")};
 }
 
 /// A number with an ending that scales it: "256kB", "168MHz". @param unit without an ending
@@ -48,7 +50,7 @@ std::optional<double> scaled(const std::string& text, const char* flag, const ch
       factor = scale;
       break;
     }
-  const double value = factor * torsio::si_quantity(number, unit, flag);
+  const double value = factor * torsio::signed_quantity_with_unit(number, unit, flag);
   if (!(value > 0.0) || !std::isfinite(value))
     throw torsio::UsageError({.place = flag,
                               .expected = fmt::format("a positive number, such as {}", example),

@@ -31,6 +31,7 @@ namespace {
 struct FitFlags {
   DataFlags data;
   std::vector<std::string> validation;
+  std::vector<std::string> test;
   std::string family;
   std::vector<std::string> settings;
   std::string output;
@@ -138,6 +139,12 @@ void run(FitFlags& flags) {
   run_one(flags);
 }
 
+std::vector<std::string> further_recordings(const FitFlags& flags) {
+  std::vector<std::string> all = flags.validation;
+  all.insert(all.end(), flags.test.begin(), flags.test.end());
+  return all;
+}
+
 void run_one(FitFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   std::vector<std::string> missing;
@@ -151,10 +158,10 @@ void run_one(FitFlags& flags) {
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
   flags.data.check_outputs(
       {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
-      flags.validation);
+      further_recordings(flags));
   require_model_file(flags.output);
   ProgressBar progress;
-  torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
+  torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, progress.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   flags.data.add_target(dataset, features);
   const torsio::FitCheck check = torsio::check_for_fit(dataset, features, flags.allow_leak);
@@ -195,6 +202,7 @@ void add_fit(CLI::App& app) {
   verb->add_option("--set", flags->settings, "set an option of the family, option=value")
       ->allow_extra_args(false);
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
+  verb->add_option("--test", flags->test, "recordings to score on, which the fit does not use");
   verb->add_option(
       "-o,--output", flags->output,
       "model file; untouched unless the fit succeeds; {joint} in its name: a model for each "

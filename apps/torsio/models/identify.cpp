@@ -12,6 +12,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/identify/drive/drive_file.hpp"
@@ -56,7 +57,7 @@ torsio::IdentifyOptions options_of(const DriveIdentifyFlags& flags,
                                   .threads = flags.threads,
                                   .progress = progress};
   if (!flags.step.empty()) {
-    options.step_s = torsio::si_quantity(flags.step, "s", "--step");
+    options.step_s = torsio::signed_quantity_with_unit(flags.step, "s", "--step");
     constexpr double kShortest_s = 1e-5;
     constexpr double kLongest_s = 0.1;
     if (!(options.step_s >= kShortest_s && options.step_s <= kLongest_s))
@@ -245,11 +246,14 @@ void add_output_options(CLI::App& verb, DriveIdentifyFlags& flags) {
   verb.add_option("-o,--output", flags.output,
                   "file of the identified drive (JSON), for --from; untouched unless the work "
                   "succeeds");
-  verb.add_option("--write", flags.written,
-                  "TARGET FILE: the drive for another program, bam, mjcf or isaaclab, refitted "
-                  "with its step; repeatable")
-      ->type_name("TARGET FILE");
-  verb.add_option("--name", flags.name, "of the actuator in these files")->capture_default_str();
+  CLI::Option* const write =
+      verb.add_option("--write", flags.written,
+                      "TARGET FILE: the drive for another program, bam, mjcf or isaaclab, refitted "
+                      "with its step; repeatable")
+          ->type_name("TARGET FILE");
+  verb.add_option("--name", flags.name, "of the actuator in these files")
+      ->needs(write)
+      ->capture_default_str();
 }
 
 }  // namespace

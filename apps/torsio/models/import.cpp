@@ -7,6 +7,7 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "report/model_description.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -75,7 +76,7 @@ torsio::ForeignNetwork read_weights(const ImportFlags& flags, const torsio::Fore
 
 torsio::ImportOptions options_of(const ImportFlags& flags) {
   // Not inside the braces below: if it throws there, g++ 12 destroys members that were never made.
-  const double rate_Hz = torsio::si_quantity(flags.data.rate, "Hz", "--rate");
+  const double rate_Hz = torsio::signed_quantity_with_unit(flags.data.rate, "Hz", "--rate");
   return {.features = {.inputs = flags.data.wanted_inputs(), .definitions = {}},
           .target = flags.data.target.empty() ? "torque_Nm" : flags.data.target,
           .sample_rate_Hz = rate_Hz,

@@ -7,6 +7,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/transfer_curve.hpp"
@@ -65,7 +66,7 @@ std::optional<torsio::TransferRatios> ratios_of(const TransferFlags& flags) {
 std::vector<double> curve_times(const TransferFlags& flags) {
   std::vector<double> seconds;
   for (const std::string& time : flags.curve)
-    seconds.push_back(torsio::si_quantity(time, "s", "--curve"));
+    seconds.push_back(torsio::signed_quantity_with_unit(time, "s", "--curve"));
   return seconds;
 }
 
@@ -74,7 +75,7 @@ torsio::Dataset load(const TransferFlags& flags, const torsio::ModelFile& base,
   DataFlags data = flags.data;
   data.use_model(base, flags.model);
   torsio::Dataset dataset = data.load({}, flags.test, progress);
-  const double use_s = torsio::si_quantity(flags.use, "s", "--use");
+  const double use_s = torsio::signed_quantity_with_unit(flags.use, "s", "--use");
   if (!dataset.has_role(torsio::Role::test))
     torsio::hold_out_after(dataset, use_s);
   else

@@ -10,6 +10,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "core/quantity.hpp"
 #include "report/json_text.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
@@ -141,7 +142,7 @@ std::string_view amplitude_unit(const SimulateFlags& flags, const torsio::DataSh
 torsio::OperatingConditions conditions(const SimulateFlags& flags) {
   torsio::OperatingConditions of;
   const auto set = [](double& value, const std::string& text, const char* unit, const char* flag) {
-    if (!text.empty()) value = torsio::si_quantity(text, unit, flag);
+    if (!text.empty()) value = torsio::signed_quantity_with_unit(text, unit, flag);
   };
   set(of.temperature_K, flags.temperature, "K", "--temperature");
   set(of.warm_up_K, flags.warm_up, "K", "--warm-up");
@@ -157,7 +158,7 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags, const torsio:
                               .is_electrical = flags.is_electrical,
                               .with_truth = flags.with_truth};
   const auto set = [](auto& value, const std::string& text, const char* unit, const char* flag) {
-    if (!text.empty()) value = torsio::si_quantity(text, unit, flag);
+    if (!text.empty()) value = torsio::signed_quantity_with_unit(text, unit, flag);
   };
   set(spec.duration_s, flags.duration, "s", "--duration");
   set(spec.lever_m, flags.lever, "m", "--lever");
@@ -169,7 +170,7 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags, const torsio:
   if (!flags.amplitude.empty()) {
     const std::string_view unit = amplitude_unit(flags, sheet);
     (unit == "rad" ? spec.angle_amplitude_rad : spec.torque_amplitude_Nm) =
-        torsio::si_quantity(flags.amplitude, unit, "--amplitude");
+        torsio::signed_quantity_with_unit(flags.amplitude, unit, "--amplitude");
   }
   spec.is_impedance_zero = flags.impedance == "zero";
   spec.conditions = conditions(flags);

@@ -10,6 +10,7 @@
 
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "report/monitor.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -112,7 +113,7 @@ std::vector<torsio::MonitoredSignal> default_signals(const std::vector<std::stri
 
 /// With its unit, or the value of an option that is not given.
 double quantity_or(const std::string& text, const char* unit, const char* option, double value) {
-  return text.empty() ? value : torsio::si_quantity(text, unit, option);
+  return text.empty() ? value : torsio::signed_quantity_with_unit(text, unit, option);
 }
 
 void check_last_day(const std::string& date) {

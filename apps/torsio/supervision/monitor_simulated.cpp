@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/progress_bar.hpp"
+#include "core/quantity.hpp"
 #include "report/fault_campaign.hpp"
 #include "report/monitor.hpp"
 #include "sim/campaign/duty_recording.hpp"
@@ -116,8 +117,9 @@ torsio::MonitorReplay replay_simulated(const SimulatedMonitorFlags& flags,
                                        const std::string& monitor_file,
                                        torsio::MonitorSettings& settings) {
   const torsio::DataSheet sheet = one_actuator(flags);
-  torsio::DutyRun work{.seed = flags.seed,
-                       .duration_s = torsio::si_quantity(flags.duration, "s", "--duration")};
+  torsio::DutyRun work{
+      .seed = flags.seed,
+      .duration_s = torsio::signed_quantity_with_unit(flags.duration, "s", "--duration")};
   if (!flags.faults.empty()) work.faults = torsio::read_fault_schedule(flags.faults, sheet);
   for (const std::string& injection : flags.injections)
     work.faults.faults.push_back(torsio::parse_injection(injection, sheet));

@@ -8,6 +8,7 @@
 
 #include "actuator/second_stage.hpp"
 #include "core/checks.hpp"
+#include "core/quantity.hpp"
 #include "core/text_cursor.hpp"
 #include "core/trimmed.hpp"
 #include "data/names.hpp"
@@ -85,9 +86,9 @@ class InjectionText {
 
   void read_times(std::string_view times, ScheduledFault& fault) const {
     const std::size_t dots = times.find("..");
-    fault.start_s = si_quantity(times.substr(0, dots), "s", place() + ": time");
+    fault.start_s = signed_quantity_with_unit(times.substr(0, dots), "s", place() + ": time");
     if (dots == std::string_view::npos) return;
-    const double end_s = si_quantity(times.substr(dots + 2), "s", place() + ": end");
+    const double end_s = signed_quantity_with_unit(times.substr(dots + 2), "s", place() + ": end");
     if (!(end_s > fault.start_s)) refuse("an end after the start", times);
     fault.duration_s = end_s - fault.start_s;
   }
@@ -140,7 +141,7 @@ class InjectionText {
     }
     const std::string_view unit =
         rule.amount_unit.empty() ? split_channel_name(fault.what)->unit->suffix : rule.amount_unit;
-    fault.amount = si_quantity(without_plus(amount), unit, place());
+    fault.amount = signed_quantity_with_unit(without_plus(amount), unit, place());
   }
 
   [[nodiscard]] static std::string_view without_plus(std::string_view text) {
