@@ -53,8 +53,8 @@ TEST_F(IdentifyProgram, RefusesOptionsThatHaveNoEffectOnADriveFromAFile) {
 
 TEST_F(IdentifyProgram, RefusesAFileThatItCannotWriteBeforeTheFit) {
   record(1);
-  for (const char* const more :
-       {"--write bam servo.json", "--write mjcf a.xml --name 2go", "--spring --terms delay"}) {
+  for (const char* const more : {"--write bam servo.json", "--write mjcf a.xml --name 2go",
+                                 "--spring --terms delay", "--name elbow"}) {
     const Outcome outcome =
         torsio(std::string("identify air1.csv --load load.yaml --starts 100 ") + more);
     EXPECT_EQ(outcome.exit_code, kCallWasWrong) << more;

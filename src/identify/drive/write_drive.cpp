@@ -192,6 +192,16 @@ std::string in_comment(const std::string& text) {
   return clean;
 }
 
+/// The actuators of both simulators have their gains at all times, and no filter.
+void add_what_servos_lack(const std::vector<DriveLog>& logs, WrittenDrive& written) {
+  if (has_passive_run(logs) && !logs.front().brakes_when_off)
+    written.not_expressed.emplace_back(logs.front().kind == CommandKind::goal_to_duty
+                                           ? "the open winding without power: damping remains"
+                                           : "motions without power");
+  if (logs.front().speed_filter_rad_s > 0.0)
+    written.not_expressed.emplace_back("the low-pass of the law's speed");
+}
+
 std::string mjcf_joint(const DriveLog& log, const Refitted& fit, const ServoGains& gains,
                        const std::string& name) {
   using enum DriveParameter;
@@ -252,10 +262,7 @@ WrittenDrive write_mjcf(const DriveIdentification& identified, const std::vector
                        .own_mae_rad = identified.mae_rad,
                        .model = {},
                        .not_expressed = other_terms(identified.terms, kept)};
-  if (has_passive_run(logs) && !log.brakes_when_off)
-    written.not_expressed.emplace_back("the open winding without power: damping remains");
-  if (log.speed_filter_rad_s > 0.0)
-    written.not_expressed.emplace_back("the low-pass of the law's speed");
+  add_what_servos_lack(logs, written);
   const std::string joint = actuator + (has(fit.terms, DriveTerm::spring) ? "_motor" : "_joint");
   written.text = fmt::format(
       "<!-- Written by torsio identify for the load and the gain of {}. Refitted at this time "
@@ -314,8 +321,9 @@ WrittenDrive write_isaaclab(const DriveIdentification& identified,
   const LabActuator lab = lab_actuator(log, fit, gains);
   if (has(fit.terms, DriveTerm::delay) && lab.configuration != "DelayedPDActuatorCfg")
     written.not_expressed.emplace_back("delay, shorter than half a physics step");
-  if (log.speed_filter_rad_s > 0.0)
-    written.not_expressed.emplace_back("the low-pass of the law's speed");
+  if (log.kind == CommandKind::goal_to_duty && lab.configuration != "DCMotorCfg")
+    written.not_expressed.emplace_back("the limit of the supply at speed");
+  add_what_servos_lack(logs, written);
   const std::string effort = gains.limit_Nm < kNoLimit_Nm
                                  ? fmt::format("    effort_limit={:.9g},\n", gains.limit_Nm)
                                  : std::string();
