@@ -88,8 +88,10 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
   expect_error(torsio("track --friction nan"), kCallWasWrong, "--friction: expected a share");
   expect_error(torsio("track --observer 0Hz"), kCallWasWrong, "--observer: expected");
   expect_error(torsio("track --observer 400Hz"), kWorkFailed, "phase margin, found -");
-  expect_error(torsio("track --limits position=1rad..2rad"), kCallWasWrong, "not between the limits");
-  expect_error(torsio("track --limits speed=1rad_s,speed=2rad_s"), kCallWasWrong, "speed is given twice");
+  expect_error(torsio("track --limits position=1rad..2rad"), kCallWasWrong,
+               "not between the limits");
+  expect_error(torsio("track --limits speed=1rad_s,speed=2rad_s"), kCallWasWrong,
+               "speed is given twice");
   expect_error(torsio("track --limits torque=5Nm"), kCallWasWrong, "unknown limit 'torque=5Nm'");
   expect_error(torsio("track --limits position=0.0001rad"), kWorkFailed, "no room between");
   expect_error(torsio("track --velocity-bandwidth 50rad_s"), kCallWasWrong, "--acts-on velocity");
