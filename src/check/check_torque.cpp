@@ -17,6 +17,16 @@ namespace {
 
 constexpr double kMaxOnPlateau = 2.0 / 3.0;  // share of the samples
 
+/// The ends of its values at which a target stays.
+std::string levels_text(const Plateau& plateau, const std::string& target) {
+  const std::string unit = unit_label(target);
+  if (plateau.is_at_zero) return "zero";
+  if (plateau.levels.size() == 1)
+    return fmt::format("one end of its values, {:.4g} {}", plateau.levels.front(), unit);
+  return fmt::format("its lowest and highest values, {:.4g} and {:.4g} {}", plateau.levels.front(),
+                     plateau.levels.back(), unit);
+}
+
 }  // namespace
 
 /// Whether the torque has lost its sign, which is reported.
@@ -46,14 +56,19 @@ std::optional<double> Checker::noise_of_target(std::size_t r) const {
 void Checker::report_plateau(std::size_t r, const Plateau& plateau) {
   std::vector<SampleRange> places;
   for (const Rest& rest : plateau.samples) places.push_back({rest.begin, rest.end});
-  add(plateau.share >= kMaxOnPlateau ? Verdict::fail : Verdict::warn, "saturation",
+  const bool hides_most = plateau.share >= kMaxOnPlateau && !plateau.is_at_zero;
+  add(hides_most ? Verdict::fail : Verdict::warn, "saturation",
       dataset_.records[r].recording.name(),
-      fmt::format("{}: {:.1f} % of the samples lie within its noise at its lowest and highest "
-                  "values, while {} moves through {:.0f} % of its range",
-                  dataset_.target, 100.0 * plateau.share, spec_.inputs.front(),
-                  100.0 * plateau.input_share),
-      "If that is the limit of the sensor, record again with a larger range or smaller loads, or "
-      "cut those parts out.",
+      fmt::format("{}: {:.1f} % of the samples lie within its noise at {}, while {} moves through "
+                  "{:.0f} % of its range",
+                  dataset_.target, 100.0 * plateau.share, levels_text(plateau, dataset_.target),
+                  spec_.inputs.front(), 100.0 * plateau.input_share),
+      plateau.is_at_zero ? "If the load is gone there, leave it so; if the sensor has no values "
+                           "beyond zero, record "
+                           "with one that has both signs."
+                         : "If that is the limit of the sensor, record again with a larger range "
+                           "or smaller loads, "
+                           "or cut those parts out.",
       std::move(places));
 }
 
@@ -62,7 +77,8 @@ void Checker::check_hidden_torque() {
   for_each_record([&](std::size_t r) {
     const auto noise = noise_of_target(r);
     const auto plateau = noise ? find_plateau(pairs_[r], *noise) : std::nullopt;
-    if (plateau && plateau->share >= kMaxOnPlateau) report_plateau(r, *plateau);
+    if (plateau && plateau->share >= kMaxOnPlateau && !plateau->is_at_zero)
+      report_plateau(r, *plateau);
   });
 }
 

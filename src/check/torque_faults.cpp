@@ -153,10 +153,13 @@ std::optional<Plateau> find_plateau(const Pair& pair, double noise) {
       there += n - begin;
     }
     const double share = static_cast<double>(there) / static_cast<double>(sorted.size());
-    if (share >= kOnEachSide)
+    if (share >= kOnEachSide) {
       plateau.input_share = std::min(plateau.input_share, moved.width() / input_width);
+      plateau.levels.push_back(end);
+    }
     plateau.share += share;
   }
+  plateau.is_at_zero = plateau.levels.size() == 1 && std::abs(plateau.levels.front()) <= zone;
   const bool is_found = plateau.share >= kOnPlateau && plateau.input_share >= kMovesOnPlateau;
   return is_found ? std::optional(plateau) : std::nullopt;
 }

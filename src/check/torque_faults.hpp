@@ -30,8 +30,10 @@ struct Limit {
 
 /// Much of the target lies within its noise at its lowest and highest values, while the input moves on.
 struct Plateau {
-  double share = 0.0;        ///< samples there
-  double input_share = 0.0;  ///< what the input moves through meanwhile, of its range
+  double share = 0.0;          ///< samples there
+  std::vector<double> levels;  ///< the ends, lowest first, that have a tenth of the samples
+  bool is_at_zero = false;     ///< the only level is zero: a load may be gone there
+  double input_share = 0.0;    ///< what the input moves through meanwhile, of its range
   std::vector<Rest> samples;
 };
 /// Empty with less than 30 % of the samples there, or 30 % of the input's range at each end that has a tenth of them.

@@ -281,6 +281,31 @@ TEST(CheckSensors, NameTheLimitOfAnAmplifierInItsNoise) {
   EXPECT_EQ(verdict_of(hidden, "saturation"), Verdict::fail) << text_of(hidden);
 }
 
+TEST(CheckSensors, NameTheOnlyEndAtWhichATorqueStays) {
+  Random random(4);
+  const auto findings =
+      findings_of(alone(changed(bench_recording("one side"), [&](Channel& channel) {
+        if (channel.name != "torque_Nm") return;
+        for (double& value : channel.values) value = std::min(value, 3.0) + 0.02 * random.normal();
+      })));
+  ASSERT_EQ(verdict_of(findings, "saturation"), Verdict::warn) << text_of(findings);
+  const std::string& message = first_of(findings, "saturation").message;
+  EXPECT_NE(message.find("at one end of its values, 3."), std::string::npos) << message;
+}
+
+TEST(CheckSensors, DoNotFailALoadThatPullsToOneSideOnly) {
+  Random random(5);
+  const auto findings =
+      findings_of(alone(changed(bench_recording("unilateral"), [&](Channel& channel) {
+        if (channel.name != "torque_Nm") return;
+        for (double& value : channel.values)
+          value = std::max(value - 4.0, 0.0) + 0.02 * random.normal();
+      })));
+  ASSERT_EQ(verdict_of(findings, "saturation"), Verdict::warn) << text_of(findings);
+  EXPECT_NE(first_of(findings, "saturation").message.find("within its noise at zero"),
+            std::string::npos);
+}
+
 TEST(CheckSensors, PassAFewMissingTorquesAndAdviseToHoldThoseOfASlowerSensor) {
   const auto missing = [](auto is_missing) {
     return findings_of(alone(changed(bench_recording("missing"), [&](Channel& channel) {

@@ -172,6 +172,18 @@ TEST(EvaluateModel, SaysWhichInputLeavesTheTrainingByHowMuch) {
   EXPECT_EQ(evaluate_model(file, larger, runs).warnings, warnings);
 }
 
+TEST(EvaluateModel, NamesNoFactorOfASpeedThatIsNearOne) {
+  const Dataset dataset = test::bench_dataset();
+  ModelFile file = trained(dataset, "linear_coulomb").file;
+  FeatureRanges& ranges = file.settings.ranges;
+  ranges.highest[1] *= 0.97;
+  ranges.lowest[1] = -0.1 * ranges.highest[1];  // as if it had moved fast to one side only
+  const std::vector<std::string> warnings = evaluate_model(file, dataset).warnings;
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_THAT(warnings[0], testing::StartsWith("lowpass(spring_deflection_rate_rad_s"));
+  EXPECT_THAT(warnings[0], testing::HasSubstr("covers this range"));
+}
+
 TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {
   const Dataset dataset = test::bench_dataset();
   for (const char* family : {"linear", "linear_coulomb", "polynomial", "dgmm"})
