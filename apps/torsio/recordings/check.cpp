@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,7 +32,8 @@ struct CheckFlags {
   bool advise = false;
   bool list = false;
   std::vector<std::string> want;
-  std::string drive;  ///< drive file, for the advice on a drive
+  std::string drive;        ///< drive file, for the advice on a drive
+  std::size_t threads = 0;  ///< that identify it
   JsonOutput json;
   ReportOutput report;
 };
@@ -63,7 +65,8 @@ void add_drive(CheckedDrive drive, Checked& result) {
 void check_drive_too(const CheckFlags& flags, const torsio::DriveSheet& law,
                      const torsio::Progress& progress, Checked& result) {
   try {
-    add_drive(checked_drive(*result.dataset, flags.data.load_file, law, progress), result);
+    add_drive(checked_drive(*result.dataset, flags.data.load_file, law, flags.threads, progress),
+              result);
   } catch (const torsio::Cancelled&) {
     throw;
   } catch (const torsio::Error& error) {
@@ -85,11 +88,19 @@ Checked checked(const CheckFlags& flags) {
     ProgressBar progress;
     torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
     std::optional<torsio::DriveSheet> law;
-    if (flags.advise && !flags.data.load_file.empty()) law = law_to_check(dataset, flags.drive);
+    if (!flags.data.load_file.empty()) law = law_to_check(dataset, flags.drive);
+    if (law && !flags.advise) {
+      remark(
+          "note: the recordings are those of a drive, too; --advise checks them for torsio "
+          "identify and proposes its next recording");
+      law.reset();
+    }
     if (law && lacks_deflection(dataset)) {
       Checked result{.findings = {{torsio::Verdict::pass, "clock", "", "uniform", ""}},
                      .advice = {}};
-      add_drive(checked_drive(dataset, flags.data.load_file, *law, progress.listener()), result);
+      add_drive(
+          checked_drive(dataset, flags.data.load_file, *law, flags.threads, progress.listener()),
+          result);
       return result;
     }
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
@@ -189,6 +200,10 @@ void add_check(CLI::App& app) {
                        "(docs/use/known_load.md)");
   verb->add_option("--drive", flags->drive,
                    "with --advise and --load: file of the drive's law (default: by the channels)");
+  verb->add_option("--threads", flags->threads,
+                   "with --advise and --load: threads that identify the drive; the result does not "
+                   "depend on it (default: all)")
+      ->check(CLI::Range(0, 1024));
   verb->add_option("--test", flags->test,
                    "held-out recordings: are they inside the training range?");
   verb->add_flag(

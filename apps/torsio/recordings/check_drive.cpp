@@ -49,7 +49,8 @@ std::optional<torsio::DriveSheet> law_to_check(const torsio::Dataset& dataset,
 }
 
 CheckedDrive checked_drive(const torsio::Dataset& dataset, const std::string& load_file,
-                           const torsio::DriveSheet& drive, const torsio::Progress& progress) {
+                           const torsio::DriveSheet& drive, std::size_t threads,
+                           const torsio::Progress& progress) {
   const torsio::LoadSheet load = torsio::read_load_sheet(load_file);
   const std::vector<torsio::Recording> recordings = training_recordings(dataset);
   double duration_s = 0.0;
@@ -64,6 +65,7 @@ CheckedDrive checked_drive(const torsio::Dataset& dataset, const std::string& lo
                              {.terms = usual_terms(drive.law),
                               .starts = 1,
                               .has_standard_errors = false,
+                              .threads = threads,
                               .progress = progress});
   CheckedDrive checked{.findings = {}, .advice = torsio::advise_drive(identified, recordings)};
   for (const torsio::DriveFinding& finding : identified.findings)

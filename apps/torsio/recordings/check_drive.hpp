@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,8 +26,9 @@ struct CheckedDrive {
 
 /// Identifies the drive of the training recordings, with the terms that every drive of its law may have and without
 /// standard errors, and asks for its advice.
+/// @param threads 0: as many as the machine has; the result does not depend on them
 /// @throws torsio::Error if they do not determine a model.
 [[nodiscard]] CheckedDrive checked_drive(const torsio::Dataset& dataset,
                                          const std::string& load_file,
-                                         const torsio::DriveSheet& drive,
+                                         const torsio::DriveSheet& drive, std::size_t threads,
                                          const torsio::Progress& progress);

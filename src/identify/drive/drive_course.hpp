@@ -11,7 +11,7 @@ namespace torsio {
 struct DriveCourse {
   double largest_speed_rad_s = 0.0;
   std::size_t driven = 0;     ///< moving samples with power
-  std::size_t saturated = 0;  ///< of these, with the output at its limit
+  std::size_t saturated = 0;  ///< driven samples with the output at its limit
   bool has_passive_motion = false;
   double lowest_load_Nm = HUGE_VAL;  ///< lowest torque of the load
   double highest_load_Nm = -HUGE_VAL;

@@ -124,7 +124,7 @@ BothAngles both_angles(const Recording& recording, const DriveSheet& drive) {
 /// What the motor's and the joint's angle show of a spring between them.
 std::string shown_by_both_angles(const std::vector<Recording>& recordings,
                                  const DriveSheet& drive) {
-  constexpr double kShare = 0.01;       // of the joint's motion
+  constexpr double kShare = 0.01;       // share of the joint's motion
   constexpr double kSameRatio_1 = 0.2;  // Otherwise the gear ratio is not that of the angles.
   double square = 0.0;
   double joint = 0.0;
@@ -195,7 +195,7 @@ bool is_error_oscillating(const std::vector<DriveLog>& logs,
          static_cast<double>(of_errors) > kFaster * static_cast<double>(of_motions);
 }
 
-/// A delay or a direction at its bound may stand for a spring that the model lacks.
+/// A delay or a direction at its bound may replace a spring that the model lacks.
 std::string shown_by_bounds(const std::vector<DriveLog>& logs,
                             const DriveIdentification& identified) {
   const auto found =

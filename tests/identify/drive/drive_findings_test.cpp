@@ -170,7 +170,7 @@ TEST(DriveFindings, SuggestASpringWhereTheAnglesOfMotorAndJointDiffer) {
                                          HasSubstr("--spring"))))));
 }
 
-TEST(DriveFindings, SuggestASpringWhereADelayAtItsBoundStandsForOne) {
+TEST(DriveFindings, SuggestASpringWhereADelayAtItsBoundReplacesOne) {
   EXPECT_THAT(
       findings_of_one_mass(false),
       Contains(AllOf(Field(&DriveFinding::subject, "spring"),

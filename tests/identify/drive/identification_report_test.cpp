@@ -1,4 +1,4 @@
-// What the report of an identified drive says and draws.
+// The text and the figures of the report of an identified drive.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ DriveIdentification servo_without_errors() {
   return drive;
 }
 
-TEST(IdentificationReport, DoesNotJudgeParametersWithoutStandardErrors) {
+TEST(IdentificationReport, HasNoVerdictOnParametersWithoutStandardErrors) {
   const DriveIdentification drive = servo_without_errors();
   const std::string unknown = "it is not known which parameters";
   EXPECT_THAT(identification_text(drive), HasSubstr(unknown));
@@ -39,13 +39,13 @@ TEST(IdentificationReport, DoesNotJudgeParametersWithoutStandardErrors) {
   const std::vector<Recording> recordings{testing::servo_recording({}, 200.0, 0.7, 0.3, false, 1)};
   EXPECT_THAT(identification_report(drive, recordings, {}).summary, Contains(HasSubstr(unknown)));
 
-  DriveIdentification judged = drive;
-  judged.parameters.front().standard_error = 0.001;
-  judged.parameters.front().lowest = 0.9 * judged.parameters.front().value;
-  judged.parameters.front().highest = 1.1 * judged.parameters.front().value;
-  judged.parameters.front().is_determined = true;
-  EXPECT_THAT(identification_text(judged), Not(HasSubstr(unknown)));
-  EXPECT_THAT(identification_json(judged, {}), HasSubstr("\"is_determined\": true"));
+  DriveIdentification complete = drive;
+  complete.parameters.front().standard_error = 0.001;
+  complete.parameters.front().lowest = 0.9 * complete.parameters.front().value;
+  complete.parameters.front().highest = 1.1 * complete.parameters.front().value;
+  complete.parameters.front().is_determined = true;
+  EXPECT_THAT(identification_text(complete), Not(HasSubstr(unknown)));
+  EXPECT_THAT(identification_json(complete, {}), HasSubstr("\"is_determined\": true"));
 }
 
 TEST(IdentificationReport, DrawsFrictionUpToTheLargestLoadOfTheRecordings) {
