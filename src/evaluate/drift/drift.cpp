@@ -168,7 +168,7 @@ class Comparison {
 
   void build_columns() {
     const std::size_t inputs = runs_.front().features.columns;
-    columns_ = Matrix(residual_.size(), 4 + inputs - 1);
+    columns_ = Matrix(residual_.size(), 5 + inputs - 1);
     std::size_t row = 0;
     for (const ComparedRun& run : runs_)
       for (const std::size_t n : run.rows) {
@@ -179,7 +179,8 @@ class Comparison {
           columns_(row, 3) =
               -parts_.stiffness[row] *
               std::clamp((run.x[n] - parts_.middle) / (kPlayWidth * half()), -1.0, 1.0);
-        for (std::size_t j = 1; j < inputs; ++j) columns_(row, 3 + j) = run.features(n, j);
+        columns_(row, 4) = parts_.widening[row];
+        for (std::size_t j = 1; j < inputs; ++j) columns_(row, 4 + j) = run.features(n, j);
         ++row;
       }
   }

@@ -17,6 +17,7 @@ constexpr std::size_t kKnots = 13;
 constexpr std::size_t kStops = 7;
 constexpr double kSmallestStop = 0.003;  // threshold over half of the range
 constexpr double kLargestStop = 0.16;
+constexpr double kWider = 2.0;
 
 /// Knots over the x that occurs.
 class Curve {
@@ -61,10 +62,10 @@ class Curve {
   double step_ = 1.0;
 };
 
-std::vector<double> thresholds(double half_range) {
+std::vector<double> thresholds(double half_range, double factor) {
   std::vector<double> all(kStops);
   for (std::size_t i = 0; i < kStops; ++i)
-    all[i] = half_range * kSmallestStop *
+    all[i] = factor * half_range * kSmallestStop *
              std::pow(kLargestStop / kSmallestStop,
                       static_cast<double>(i) / static_cast<double>(kStops - 1));
   return all;
@@ -73,13 +74,14 @@ std::vector<double> thresholds(double half_range) {
 /// Columns: knots, stops, stops times the load, other inputs.
 class Rows {
  public:
-  Rows(std::span<const PartsRun> runs, double lowest, double highest)
+  /// @param factor of all thresholds
+  Rows(std::span<const PartsRun> runs, double lowest, double highest, double factor = 1.0)
       : curve_(runs),
         middle_(0.5 * (lowest + highest)),
         half_(0.5 * (highest - lowest)),
         inputs_(runs.front().features->columns),
         values_(kKnots + 2 * kStops + inputs_ - 1),
-        stops_(thresholds(half_), "drift") {}
+        stops_(thresholds(half_, factor), "drift") {}
 
   [[nodiscard]] std::size_t columns() const { return values_.size(); }
   [[nodiscard]] const Curve& curve() const { return curve_; }
@@ -117,6 +119,12 @@ class Rows {
   SlipBank stops_;
 };
 
+double friction_of(std::span<const double> fitted, std::span<const double> row) {
+  double friction = 0.0;
+  for (std::size_t i = kKnots; i < kKnots + 2 * kStops; ++i) friction += fitted[i] * row[i];
+  return friction;
+}
+
 }  // namespace
 
 TorqueParts torque_parts(std::span<const PartsRun> runs, double lowest, double highest) {
@@ -134,11 +142,15 @@ TorqueParts torque_parts(std::span<const PartsRun> runs, double lowest, double h
   parts.middle = rows.curve().root(knots);
   for (const PartsRun& run : runs)
     rows.run(run, [&](std::span<const double> row, double /*output*/, double x) {
-      double friction = 0.0;
-      for (std::size_t i = kKnots; i < kKnots + 2 * kStops; ++i) friction += fitted[i] * row[i];
       parts.elastic.push_back(rows.curve().value(knots, x));
       parts.stiffness.push_back(rows.curve().slope(knots, x));
-      parts.friction.push_back(friction);
+      parts.friction.push_back(friction_of(fitted, row));
+    });
+  Rows wider(runs, lowest, highest, kWider);
+  for (const PartsRun& run : runs)
+    wider.run(run, [&](std::span<const double> row, double /*output*/, double /*x*/) {
+      const double before = parts.friction[parts.widening.size()];
+      parts.widening.push_back(friction_of(fitted, row) - before);
     });
   return parts;
 }

@@ -96,6 +96,24 @@ TEST(Drift, AJointThatHasNotChangedIsReportedAsSuch) {
   EXPECT_THAT(drift_text(drift, "torque_Nm"), HasSubstr("The joint has not changed"));
 }
 
+// Age widens the break-away angles with the friction, which looks like more stiffness.
+TEST(Drift, OfAnAgedJointIsSofterWithinItsInterval) {
+  for (const double age : {0.3, 0.6, 1.0}) {
+    Dataset dataset;
+    record(dataset, data_sheet(kActuator),
+           {.experiment = "sweep", .seed = 51, .lever_m = 0.17, .conditions = {.age = age}},
+           Role::test);
+    const Drift drift = detect_drift(model(), dataset);
+    const DriftQuantity& stiffness = of(drift, "stiffness or gain");
+    EXPECT_LT(stiffness.relative, 0.0) << age;
+    EXPECT_LT(stiffness.lowest, -0.1 * age * stiffness.before) << age;
+    EXPECT_GT(stiffness.highest, -0.1 * age * stiffness.before) << age;
+    const DriftQuantity& friction = of(drift, "friction");
+    EXPECT_EQ(friction.verdict, DriftVerdict::changed) << age;
+    EXPECT_GT(friction.relative, 0.6 * age) << age;
+  }
+}
+
 TEST(Drift, FindsAChangeOfTheStiffness) {
   const Drift drift =
       detect_drift(model(), today(worn(data_sheet(kActuator), {.stiffness = 0.95})));
