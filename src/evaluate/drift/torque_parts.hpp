@@ -19,7 +19,7 @@ struct TorqueParts {
   std::vector<double> stiffness;  ///< dE/dx
   std::vector<double> friction;   ///< H
   std::vector<double>
-      widening;  ///< change of H by thresholds that are twice as large, at the same forces
+      widening;         ///< change of H by thresholds that are twice as large, at the same forces
   double middle = 0.0;  ///< x0: where E is 0; NaN: nowhere
 };
 
