@@ -62,7 +62,7 @@ void add_record(InputCourses& courses, FeaturePipeline& pipeline, const FeatureR
 std::string advice(const InputCourse& course, double lowest, double highest, bool is_rate) {
   const double trained = std::max(std::abs(lowest), std::abs(highest));
   const double here = std::max(std::abs(course.lowest), std::abs(course.highest));
-  constexpr double kFaster = 1.1;  // Less is said by the ranges.
+  constexpr double kFaster = 1.1;  // Smaller factors show in the ranges.
   if (is_rate && here >= kFaster * trained && trained > 0.0)
     return fmt::format("add a training recording that moves {:.1f} times as fast", here / trained);
   return "add a training recording that covers this range";

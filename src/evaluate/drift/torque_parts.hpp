@@ -18,9 +18,8 @@ struct TorqueParts {
   std::vector<double> elastic;    ///< E at each sample
   std::vector<double> stiffness;  ///< dE/dx
   std::vector<double> friction;   ///< H
-  std::vector<double>
-      widening;         ///< change of H by thresholds that are twice as large, at the same forces
-  double middle = 0.0;  ///< x0: where E is 0; NaN: nowhere
+  std::vector<double> widening;   ///< change of H as its thresholds double, at the same forces
+  double middle = 0.0;            ///< x0: where E is 0; NaN: nowhere
 };
 
 /// The samples of one recording, in the order of time.

@@ -104,7 +104,7 @@ TEST(WriteDrive, NamesWhatATargetDoesNotExpress) {
   EXPECT_THAT(lab.text, HasSubstr("not run with Isaac Lab"));
   EXPECT_THAT(lab.text, HasSubstr("armature="));
   EXPECT_THAT(lab.not_expressed, ::testing::Contains(HasSubstr("open winding")));
-  // Of the configurations of Isaac Lab only DCMotorCfg has the supply's limit, and that one has no delay.
+  // Only DCMotorCfg of Isaac Lab has the supply's limit, and that one has no delay.
   const bool has_limit = lab.text.find("DCMotorCfg(") != std::string::npos;
   EXPECT_EQ(lab.text.find("the limit of the supply at speed") == std::string::npos, has_limit);
 }
