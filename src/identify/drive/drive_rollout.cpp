@@ -413,11 +413,17 @@ namespace drive_rollout {
 
 HWY_EXPORT(roll_out_lanes);
 
+// Here, since a build for one instruction set finds no qualified name.
+static void dispatch(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,
+                     const RolloutOptions& options, const RolloutOutput& output) {
+  HWY_DYNAMIC_DISPATCH(roll_out_lanes)(log, run, parameters, options, output);
+}
+
 }  // namespace drive_rollout
 
 void roll_out(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,
               const RolloutOptions& options, const RolloutOutput& output) noexcept {
-  HWY_DYNAMIC_DISPATCH(drive_rollout::roll_out_lanes)(log, run, parameters, options, output);
+  drive_rollout::dispatch(log, run, parameters, options, output);
 }
 
 }  // namespace torsio
