@@ -69,6 +69,20 @@ void add_channel(Recording& recording, const std::string& name, const py::object
   recording.add(std::move(channel));
 }
 
+void add_condition(Recording& recording, const py::object& name, const py::object& value) {
+  if (!py::isinstance<py::str>(name))
+    throw UsageError({.place = "add_condition",
+                      .expected = "a name with its unit, such as kp_1",
+                      .found = kind_of(name)});
+  const double number = PyFloat_AsDouble(value.ptr());
+  if (PyErr_Occurred() != nullptr) {
+    PyErr_Clear();
+    throw UsageError(
+        {.place = name.cast<std::string>(), .expected = "a number", .found = kind_of(value)});
+  }
+  recording.add_condition(name.cast<std::string>(), number);
+}
+
 /// Columns of a table in memory, read as those of a CSV file are.
 std::vector<Recording> recordings_from_columns(
     const std::vector<std::pair<std::string, Doubles>>& columns, std::optional<double> rate_Hz,
@@ -322,7 +336,7 @@ void bind_recording(py::module_& module) {
            "(samples,).")
       .def("add", add_channel, py::arg("name"), py::arg("values"), py::arg("fresh") = py::none(),
            "Adds a channel in SI; values of shape (samples,).")
-      .def("add_condition", &Recording::add_condition, py::arg("name"), py::arg("value"),
+      .def("add_condition", add_condition, py::arg("name"), py::arg("value"),
            "Adds a condition of the whole record, in SI.")
       .def(
           "write_csv",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Union, cast
 
 from . import _core
 from ._core import Load, Recording, UsageError
@@ -18,6 +19,47 @@ if TYPE_CHECKING:
 
 #: Recordings, paths of logs or manifests, or lists of them.
 Recordings = Union[Recording, str, "PathLike[str]", Sequence[Any]]
+
+
+def _refuse(place: str, expected: str, value: object) -> None:
+    raise UsageError(f"{place}: expected {expected}, found {'None' if value is None else type(value).__name__}")
+
+
+def _require_text(place: str, value: object, expected: str = "a str") -> None:
+    if not isinstance(value, str):
+        _refuse(place, expected, value)
+
+
+def _require_count(place: str, value: object, lowest: int) -> None:
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        _refuse(place, f"a whole number from {lowest}", value)
+    elif int(value) < lowest:
+        raise UsageError(f"{place}: expected a whole number from {lowest}, found {value}")
+
+
+def _require_flag(place: str, value: object) -> None:
+    if type(value).__name__ not in ("bool", "bool_"):  # numpy has one of its own
+        _refuse(place, "True or False", value)
+
+
+def _require_path(place: str, value: object, or_else: str = "") -> None:
+    if not isinstance(value, (str, PathLike)):
+        _refuse(place, f"{or_else}a str or a path", value)
+
+
+def _require_load(load: object) -> None:
+    if not isinstance(load, Load):
+        _require_path("load", load, "a load file (docs/use/known_load.md): a torsio.Load, ")
+
+
+def _names_of(terms: object) -> list[str] | None:
+    expected = '"auto" or names: ["delay", "load_friction"]'
+    if not isinstance(terms, (str, Iterable)):
+        _refuse("terms", expected, terms)
+    names = terms.split(",") if isinstance(terms, str) else list(cast("Iterable[Any]", terms))
+    for name in names:
+        _require_text("terms", name, expected)
+    return None if names == ["auto"] else [name.strip() for name in names]
 
 
 @dataclass(frozen=True)
@@ -106,6 +148,8 @@ class IdentifiedDrive:
         Arrays of shape (samples,): measured_rad and angle_rad of the encoder that was fitted, joint_angle_rad,
         joint_torque_Nm.
         """
+        if not isinstance(recording, Recording):
+            _refuse("simulate", "one Recording, such as an item of the list of torsio.read", recording)
         return self._core.simulate(recording)
 
     def evaluate(
@@ -120,6 +164,9 @@ class IdentifiedDrive:
         load: that of these recordings, if it is another one (docs/use/known_load.md).
         group_by: as in `identify`, for a later `write`.
         """
+        if load is not None:
+            _require_load(load)
+        _require_text("group_by", group_by)
         core = self._core.evaluate(recordings, load, group_by)
         return IdentifiedDrive(core, recordings, group_by)
 
@@ -139,6 +186,12 @@ class IdentifiedDrive:
         recordings: to which it is fitted; without them those of `identify` or `evaluate`.
         group_by: as in `identify`, by default as there: what bam's model is chosen by.
         """
+        _require_text("target", target, "bam, mjcf or isaaclab")
+        _require_path("path", path)
+        _require_text("name", name)
+        _require_count("starts", starts, 1)
+        if group_by is not None:
+            _require_text("group_by", group_by)
         groups = self._group_by if group_by is None else group_by
         used = self._recordings if recordings is None else recordings
         if used is None:
@@ -196,8 +249,15 @@ def identify(
     standard_errors, nested: without them the fits that these need are saved.
     Equal arguments give equal results. Ctrl-C stops it.
     """
-    names = terms.split(",") if isinstance(terms, str) else list(terms)
-    chosen = None if names == ["auto"] else [name.strip() for name in names]
+    _require_load(load)
+    if drive is not None:
+        _require_path("drive", drive, "a drive file (docs/use/identify.md): ")
+    chosen = _names_of(terms)
+    _require_text("group_by", group_by)
+    _require_count("starts", starts, 1)
+    _require_count("seed", seed, 0)
+    for place, flag in (("spring", spring), ("standard_errors", standard_errors), ("nested", nested)):
+        _require_flag(place, flag)
     core = _core.identify(
         recordings, load, drive, chosen, spring, group_by, starts, seed, standard_errors, nested
     )
