@@ -37,7 +37,7 @@ DriveTerms largest_terms(const IdentifyOptions& options, const LoadSheet& load, 
   const DriveTerms impossible = options.terms.value_or(DriveTerms()) & ~possible;
   for (std::size_t k = 0; k < kDriveTerms; ++k)
     if (impossible.test(k))
-      throw UsageError({.place = "--terms",
+      throw UsageError({.place = "the terms (--terms)",
                         .expected = "terms that the drive's law can have",
                         .found = std::string(name(static_cast<DriveTerm>(k))),
                         .advice = "resistance_rise and duty_exponent need a law of position or "
