@@ -96,9 +96,10 @@ void Checker::check_training() {
             "They are neither trained on nor scored. Change the expressions so that they stay "
             "finite.");
       const std::size_t usable = data.training.usable_samples();
-      if (usable < kFewSamples)
+      if (usable < kLeastGreyBoxSamples)
         add(Verdict::warn, "training data", "",
-            fmt::format("only {} samples can be used for training", usable),
+            fmt::format("only {} samples can be used for training, and grey_box needs {}", usable,
+                        kLeastGreyBoxSamples),
             "Samples are not used where the target is not a new one, where an input is not finite, "
             "and until the filters of the inputs have settled. Make longer recordings.");
       for (const std::string& recording : unused_recordings(data.training))

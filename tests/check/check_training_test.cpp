@@ -33,7 +33,7 @@ Recording with_torque(const std::function<void(Channel&)>& change) {
 Recording stale(std::size_t new_samples) {
   return with_torque([&](Channel& torque) {
     torque.fresh.assign(torque.values.size(), 0);
-    for (std::size_t k = 0; k < new_samples; ++k) torque.fresh[1000 + 300 * k] = 1;
+    for (std::size_t k = 0; k < new_samples; ++k) torque.fresh[1000 + 20 * k] = 1;
   });
 }
 
@@ -185,7 +185,13 @@ TEST(CheckTraining, WarnsOfARecordingThatIsNotUsed) {
 }
 
 TEST(CheckTraining, WarnsOfFewUsableSamplesAndOfInputsThatAreNotFinite) {
-  EXPECT_EQ(training_findings(one(stale(10))).front().verdict, Verdict::warn);
+  for (const std::size_t fresh : {10U, 150U}) {
+    const auto few = training_findings(one(stale(fresh)));
+    ASSERT_EQ(few.size(), 1U);
+    EXPECT_EQ(few.front().verdict, Verdict::warn);
+    EXPECT_NE(few.front().message.find("grey_box needs 200"), std::string::npos)
+        << few.front().message;
+  }
   const auto findings =
       training_findings(one(bench_recording("root")), {kDeflectionFormula, "joint_angle_rad^0.5"});
   ASSERT_EQ(findings.size(), 1U);

@@ -10,6 +10,8 @@ namespace torsio {
 
 /// With fewer samples, spreads and errors of a flexible model are meaningless.
 inline constexpr std::size_t kLeastSamples = 10;
+/// What `grey_box` needs, the model that most recordings are for.
+inline constexpr std::size_t kLeastGreyBoxSamples = 200;
 
 /// @throws Error if there are fewer usable samples.
 inline void require_samples(const TrainingData& data) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fit/common/folds.hpp"
+#include "fit/common/least_samples.hpp"
 #include "fit/common/usable_table.hpp"
 #include "fit/grey_box/sample_range.hpp"
 #include "torsio/core/error.hpp"
@@ -31,10 +32,9 @@ std::pair<double, double> range_of(const TrainingData& data) {
   if (!(high > low))
     throw Error({.problem = "a grey box needs a first input that varies",
                  .found = data.inputs[0].expression + " is constant in the training data"});
-  constexpr std::size_t kLeast = 200;
-  if (samples < kLeast)
+  if (samples < kLeastGreyBoxSamples)
     throw Error({.problem = "too few training samples for a grey box",
-                 .expected = fmt::format("at least {}", kLeast),
+                 .expected = fmt::format("at least {}", kLeastGreyBoxSamples),
                  .found = fmt::format("{}", samples)});
   return {low, high};
 }
