@@ -78,12 +78,12 @@ std::array<double, kOrientations.size()> errors_of_orientations(const std::vecto
 }
 
 std::string what_to_turn(const Orientation& orientation) {
-  const std::string sign =
+  std::string sign =
       "the angle counts in the other direction than the command: reverse its sign ('sign: -1' of "
       "its channel in a mapping)";
-  const std::string zero = fmt::format(
-      "the angle is not 0 where the load hangs: state 'zero: {:.0f}deg' in the load file, or shift "
-      "the angle",
+  std::string zero = fmt::format(
+      "the angle is not 0 where the load hangs: state 'zero: {:.0f}deg' in the load file "
+      "(besides one that it states), or shift the angle",
       deg_from_rad(orientation.zero_rad));
   if (orientation.zero_rad == 0.0) return sign;
   return orientation.is_mirrored ? sign + ", and " + zero : zero;

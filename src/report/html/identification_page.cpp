@@ -266,7 +266,7 @@ std::vector<std::string> summary_of(const DriveIdentification& identified) {
                              drive_parameter_info(parameter.parameter).name);
   if (!missing.empty()) summary.push_back("Not determined: " + missing + ".");
   if (!has_standard_errors(identified))
-    summary.push_back(
+    summary.emplace_back(
         "Without standard errors it is not known which parameters these recordings determine.");
   return summary;
 }

@@ -29,7 +29,6 @@ using ::testing::Contains;
 using ::testing::Field;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using testing::Servo;
 using testing::servo_recording;
 
 LoadSheet hanging_mass(const std::string& mass = "0.5kg") {
