@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -37,6 +38,14 @@ struct ReproduceFlags {
   ReportOutput report;
 };
 
+constexpr std::string_view kPaperTitles =
+    "000  Design, Modelling and Control of Novel Series-Elastic Actuators for Industrial Robots\n"
+    "001  Learning the Elasticity of a Series-Elastic Actuator for Accurate Torque Control\n"
+    "002  Design and Hysteresis Modeling of a Miniaturized Elastomer-Based Clutched Torque Sensor\n"
+    "003  A self-contained, elastic joint drive for robotics applications based on a sensorized\n"
+    "     elastomer coupling - Design and identification\n"
+    "004  Learning-Based Torque Estimation for Harmonic Drive Actuators\n";
+
 std::string studies_text() {
   torsio::TextTable table;
   table.header({"item", "paper", "question", "time"});
@@ -51,6 +60,7 @@ void list(const ReproduceFlags& flags) {
   if (!flags.page.empty()) write_text(flags.page, torsio::paper_items_page());
   if (flags.json.wants_tables())
     print("What torsio reproduce can run; the times are those of two cores:\n\n" + studies_text() +
+          fmt::format("\nThe papers (docs/development/sources.md):\n\n{}", kPaperTitles) +
           "\nEvery item of the five papers:\n\n" + torsio::paper_items_text());
   flags.json.write(torsio::paper_items_json());
 }
@@ -263,8 +273,10 @@ void add_reproduce(CLI::App& app) {
                  "show the experiments and every item of the papers with its status");
   verb->add_option("--page", flags->page, "with --list: write the items as a page: docs/papers.md");
   verb->add_flag("--fresh", flags->is_fresh, "run also what this program has run before");
-  verb->add_flag("--quick", flags->options.is_quick,
-                 "shorter recordings and smaller networks, as a quick test");
+  verb->add_flag(
+      "--quick", flags->options.is_quick,
+      "shorter recordings and smaller networks, as a quick test; the published figures beside "
+      "them are those of the full sizes");
   verb->add_option("--repeats", flags->options.repeats, "repeats with different seeds")
       ->capture_default_str();
   add_seed(*verb, flags->options.seed, "seed of the first repeat");

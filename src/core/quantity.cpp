@@ -15,7 +15,7 @@ double signed_quantity_with_unit(std::string_view text, std::string_view expecte
   double number = 0.0;
   const auto [end, code] = std::from_chars(all.data(), all.data() + all.size(), number);
   const bool is_bare = code == std::errc{} && end == all.data() + all.size();
-  const bool is_same_in_each_unit = expected_si == "1" || (number == 0.0 && expected_si != "K");
+  const bool is_same_in_each_unit = expected_si == "1" || number == 0.0;
   if (is_bare && !is_same_in_each_unit)
     throw UsageError(
         {.place = std::string(place),

@@ -88,7 +88,7 @@ Checked checked(const CheckFlags& flags) {
     ProgressBar progress;
     torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
     std::optional<torsio::DriveSheet> law;
-    if (!flags.data.load_file.empty()) law = law_to_check(dataset, flags.drive);
+    if (!flags.data.load_file.empty()) law = law_to_check(dataset, flags.drive, flags.advise);
     if (law && !flags.advise) {
       remark(
           "note: the recordings are those of a drive, too; --advise checks them for torsio "

@@ -38,13 +38,16 @@ bool lacks_deflection(const torsio::Dataset& dataset) {
 }
 
 std::optional<torsio::DriveSheet> law_to_check(const torsio::Dataset& dataset,
-                                               const std::string& drive_file) {
+                                               const std::string& drive_file, bool wants_advice) {
   if (!drive_file.empty()) return torsio::read_drive_sheet(drive_file);
   if (dataset.records.empty()) return std::nullopt;
   try {
     return torsio::assumed_drive_sheet(dataset.records.front().recording);
-  } catch (const torsio::Error&) {
-    return std::nullopt;  // The recordings are of a spring alone.
+  } catch (const torsio::Error& error) {
+    // Recordings with a deflection are those of a spring alone.
+    if (wants_advice && lacks_deflection(dataset))
+      remark(fmt::format("note: there is no advice on a drive: {}", error.what()));
+    return std::nullopt;
   }
 }
 

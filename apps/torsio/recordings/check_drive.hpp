@@ -22,7 +22,8 @@ struct CheckedDrive {
 
 /// The drive file, or the law that the channels suggest; empty: they suggest none.
 [[nodiscard]] std::optional<torsio::DriveSheet> law_to_check(const torsio::Dataset& dataset,
-                                                             const std::string& drive_file);
+                                                             const std::string& drive_file,
+                                                             bool wants_advice);
 
 /// Identifies the drive of the training recordings, with the terms that every drive of its law may have and without
 /// standard errors, and asks for its advice.

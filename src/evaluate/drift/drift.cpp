@@ -87,8 +87,9 @@ class Comparison {
     Drift drift;
     drift.calibration_rmse = calibration_rmse(model_);
     collect(drift);
-    build_columns();
-    const DirectionFit fit = fit_directions(columns_, residual_, options_.resamples, options_.seed);
+    DirectionFit fit = fit_of_directions(/*with_widening=*/false);
+    // Friction that has changed much may have other break-away angles, too.
+    if (has_much_other_friction(fit)) fit = fit_of_directions(/*with_widening=*/true);
     drift.samples = residual_.size();
     drift.effective_samples = fit.effective_samples;
     drift.corrected_rmse = fit.residual_rms();
@@ -166,23 +167,34 @@ class Comparison {
     drift.zeroed_rmse = std::sqrt(zeroed / count);
   }
 
-  void build_columns() {
+  [[nodiscard]] DirectionFit fit_of_directions(bool with_widening) const {
+    return fit_directions(columns(with_widening), residual_, options_.resamples, options_.seed);
+  }
+
+  [[nodiscard]] bool has_much_other_friction(const DirectionFit& fit) const {
+    const DriftQuantity of = friction(fit, fit.residual_rms());
+    return of.verdict == DriftVerdict::changed && std::abs(of.relative) > kSmallestFriction;
+  }
+
+  [[nodiscard]] Matrix columns(bool with_widening) const {
     const std::size_t inputs = runs_.front().features.columns;
-    columns_ = Matrix(residual_.size(), 5 + inputs - 1);
+    const std::size_t own = with_widening ? 5 : 4;
+    Matrix columns(residual_.size(), own + inputs - 1);
     std::size_t row = 0;
     for (const ComparedRun& run : runs_)
       for (const std::size_t n : run.rows) {
-        columns_(row, 0) = 1.0;
-        columns_(row, 1) = parts_.elastic[row];
-        columns_(row, 2) = parts_.friction[row];
+        columns(row, 0) = 1.0;
+        columns(row, 1) = parts_.elastic[row];
+        columns(row, 2) = parts_.friction[row];
         if (std::isfinite(parts_.middle))
-          columns_(row, 3) =
+          columns(row, 3) =
               -parts_.stiffness[row] *
               std::clamp((run.x[n] - parts_.middle) / (kPlayWidth * half()), -1.0, 1.0);
-        columns_(row, 4) = parts_.widening[row];
-        for (std::size_t j = 1; j < inputs; ++j) columns_(row, 4 + j) = run.features(n, j);
+        if (with_widening) columns(row, 4) = parts_.widening[row];
+        for (std::size_t j = 1; j < inputs; ++j) columns(row, own + j - 1) = run.features(n, j);
         ++row;
       }
+    return columns;
   }
 
   [[nodiscard]] DriftQuantity zero(const DirectionFit& fit, double model_error) const {
@@ -236,7 +248,6 @@ class Comparison {
   std::size_t reversals_ = 0;
   TorqueParts parts_;
   std::vector<double> residual_;
-  Matrix columns_;
 };
 
 }  // namespace

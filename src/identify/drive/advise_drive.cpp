@@ -127,8 +127,9 @@ std::vector<Candidate> candidates_of(const std::vector<DriveLog>& logs, const Dr
     candidates.push_back({candidate.text, information_of({&candidate.log}, identified).matrix});
   };
   add({strongest.name + " once more", strongest});
-  if (std::ranges::none_of(
-          logs, [](const DriveLog& log) { return drive_course(log).has_passive_motion; }))
+  if (strongest.load.load.gravity_Nm > 0.0 && std::ranges::none_of(logs, [](const DriveLog& log) {
+        return drive_course(log).has_passive_motion;
+      }))
     add(release(strongest, identified));
   add(second_mass(strongest, identified));
   if (const auto between = gain_between(logs, identified)) add(*between);

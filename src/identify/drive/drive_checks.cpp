@@ -209,8 +209,14 @@ void check_temperature(const std::vector<Recording>& recordings, const std::vect
     });
     if (channel == recordings[k].channels().end() || channel->values.empty()) return;
     double mean = 0.0;
-    for (const double value : channel->values)
-      mean += value / static_cast<double>(channel->values.size());
+    std::size_t finite = 0;
+    for (const double value : channel->values) {
+      if (!std::isfinite(value)) continue;
+      mean += value;
+      ++finite;
+    }
+    if (finite == 0) return;
+    mean /= static_cast<double>(finite);
     const auto [at, is_new] = range.try_emplace(logs[k].gain, mean, mean);
     if (is_new) continue;
     at->second.first = std::min(at->second.first, mean);
@@ -222,6 +228,8 @@ void check_temperature(const std::vector<Recording>& recordings, const std::vect
   for (const auto& [gain, ends] : range) middles.push_back(0.5 * (ends.first + ends.second));
   if (!std::ranges::is_sorted(middles) && !std::ranges::is_sorted(middles, std::greater<>()))
     return;
+  constexpr double kLeast_K = 2.0;
+  if (std::abs(middles.back() - middles.front()) < kLeast_K) return;
   findings.warn(
       "temperature",
       fmt::format(

@@ -24,8 +24,9 @@ double load_torque_Nm(const DriveLog& log, std::size_t n) {
 }
 
 bool is_saturated(const DriveLog& log, std::size_t n) {
-  const double output =
-      follows_goal(log.kind) ? log.gain * (log.command[n] - log.angle_rad[n]) : log.command[n];
+  double output = log.command[n];
+  if (follows_goal(log.kind))
+    output = log.gain * (log.command[n] - log.angle_rad[n]) - log.speed_gain * speed_at(log, n);
   return log.limit > 0.0 && std::abs(output) >= log.limit;
 }
 

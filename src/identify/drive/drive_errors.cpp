@@ -167,10 +167,12 @@ std::vector<IdentifiedDriveParameter> parameters_with_errors(
     const SearchedDriveParameter& searched = problem.searched[k];
     IdentifiedDriveParameter parameter{.parameter = static_cast<DriveParameter>(searched.index),
                                        .value = values[searched.index]};
-    parameter.is_at_bound = searched.is_positive ? parameter.value < searched.lowest * kAtBound ||
-                                                       parameter.value * kAtBound > searched.highest
-                                                 : parameter.value <= searched.lowest ||
-                                                       parameter.value >= searched.highest;
+    // The delay of a law is 0 at least: that does not limit the search.
+    parameter.is_at_bound = searched.is_positive
+                                ? parameter.value < searched.lowest * kAtBound ||
+                                      parameter.value * kAtBound > searched.highest
+                                : (parameter.value <= searched.lowest && searched.lowest < 0.0) ||
+                                      parameter.value >= searched.highest;
     if (has_errors) set_errors(searched, variances[k], load_variances[k], logs.size(), parameter);
     parameters.push_back(parameter);
   }

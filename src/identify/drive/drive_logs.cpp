@@ -27,6 +27,14 @@ double gear_ratio(const Recording& recording, const DriveSheet& drive) {
                .found = fmt::format("{:.6g}", ratio)});
 }
 
+double error_gain_of(const DriveSheet& drive) {
+  if (drive.error_gain_1_rad) return *drive.error_gain_1_rad;
+  throw Error({.place = drive.file,
+               .expected = "error_gain, the duty for an error of 1 rad at gain 1",
+               .found = "none",
+               .advice = "Identify the drive from recordings with duty_1, or state it."});
+}
+
 void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log) {
   const auto fact = [&](const LoadFact& stated, std::string_view name) {
     return fact_in(stated, recording, drive.file, name);
@@ -45,12 +53,7 @@ void set_law(const Recording& recording, const DriveSheet& drive, DriveLog& log)
     case DriveLaw::position:
       log.kind = CommandKind::goal_to_duty;
       log.supply_V = positive(drive.supply_V, "supply");
-      if (!drive.error_gain_1_rad)
-        throw Error({.place = drive.file,
-                     .expected = "error_gain, the duty for an error of 1 rad at gain 1",
-                     .found = "none",
-                     .advice = "Identify the drive from recordings with duty_1, or state it."});
-      log.gain = positive(drive.gain, "gain") * *drive.error_gain_1_rad;
+      log.gain = positive(drive.gain, "gain") * error_gain_of(drive);
       log.limit = drive.max_duty_1;
       return;
     case DriveLaw::pd:
@@ -148,7 +151,7 @@ DriveLog drive_log(const Recording& recording, const LoadSheet& load, const Driv
                  .found = fmt::format("{}", recording.size())});
   log.angle_rad = angle_after_gear(recording, drive);
   set_law(recording, drive, log);
-  log.command_end = ends_of_commands(log.command);
+  log.command_end = drive.is_command_held ? log.command : ends_of_commands(log.command);
   if (recording.has("enabled_1")) log.enabled = finite_channel(recording, "enabled_1");
   log.load = known_load(load, recording);
   return log;

@@ -55,6 +55,7 @@ class Rollout {
     is_law_delayed_ = log.kind == CommandKind::goal_to_torque;
     command_end_ = log.command_end.empty() ? log.command.data() + 1 : log.command_end.data();
     is_second_order_ = options.integrator == DriveIntegrator::midpoint_speed;
+    implicit_share_ = implicit_share(options.integrator);
     substeps_ = static_cast<std::size_t>(std::ceil(log.sample_period_s / options.step_s - 1e-6));
     substeps_ = std::max<std::size_t>(substeps_, 1);
     step_s_ = log.sample_period_s / static_cast<double>(substeps_);
@@ -66,6 +67,7 @@ class Rollout {
     filtered_speed_ = speed_;
     joint_angle_ = has_spring_ ? hanging_joint() : angle_;
     joint_speed_ = speed_;
+    if (is_second_order_) move_to(commanded_place(static_cast<double>(run.first)));
   }
   HWY_INLINE void run(const RolloutOutput& output) {
     for (std::size_t n = 0; n < run_.samples; ++n) {
@@ -85,6 +87,15 @@ class Rollout {
   }
 
  private:
+  static double implicit_share(DriveIntegrator integrator) {
+    switch (integrator) {
+      case DriveIntegrator::midpoint_speed: return 0.5;
+      case DriveIntegrator::implicit_damping: return 1.0;
+      case DriveIntegrator::semi_implicit_euler: break;
+    }
+    return 0.0;
+  }
+
   HWY_INLINE void set_terms(const DriveTerms& terms) {
     using enum DriveTerm;
     has_delay_ = has(terms, delay);
@@ -141,15 +152,22 @@ class Rollout {
   }
 
   // The spring carries the load, as if it were at rest; without a start of the joint in the log that is the best guess.
-  // q + deflection sin(q + zero) = angle by Newton's method, by halves where that leaves the bounds.
+  // q + deflection sin(q + zero) = angle by Newton's method, by halves where that leaves the bounds; gravity has taken the
+  // backlash to its side.
   HWY_INLINE V hanging_joint() const {
     const V deflection = hn::Div(gravity_, of_(DriveParameter::stiffness));
-    V low = hn::Sub(angle_, deflection);
-    V high = hn::Add(angle_, deflection);
-    V joint = angle_;
+    V end = angle_;
+    if (has_backlash_) {
+      const V side = sine(hn::Add(angle_, zero_));
+      const V play = hn::CopySign(of_(DriveParameter::backlash), side);
+      end = hn::Sub(end, hn::IfThenElseZero(hn::Gt(gravity_, hn::Zero(D())), play));
+    }
+    V low = hn::Sub(end, deflection);
+    V high = hn::Add(end, deflection);
+    V joint = end;
     for (int k = 0; k < 30; ++k) {
       const V place = hn::Add(joint, zero_);
-      const V error = hn::Sub(hn::MulAdd(deflection, sine(place), joint), angle_);
+      const V error = hn::Sub(hn::MulAdd(deflection, sine(place), joint), end);
       const auto is_above = hn::Gt(error, hn::Zero(D()));
       high = hn::IfThenElse(is_above, joint, high);
       low = hn::IfThenElse(is_above, low, joint);
@@ -164,8 +182,7 @@ class Rollout {
     return joint;
   }
 
-  // The command at a fraction of the period after a sample, interpolated between its stamps, except where it jumps: there
-  // the mean of both sides.
+  // The command at a fraction of the period after a sample, interpolated between its stamps, except where it jumps.
   HWY_INLINE V command(std::size_t sample, double fraction) const {
     const auto last = static_cast<double>(log_.size() - 1);
     const double now = static_cast<double>(sample) + fraction;
@@ -173,8 +190,6 @@ class Rollout {
       const double place = std::min(now, last);
       const auto below = std::min(static_cast<std::size_t>(place), log_.size() - 2);
       const double share = place - static_cast<double>(below);
-      if (is_second_order_ && fraction == 0.0 && sample > run_.first)
-        return constant(0.5 * (log_.command[sample] + command_end_[sample - 1]));
       return constant(log_.command[below] + share * (command_end_[below] - log_.command[below]));
     }
     const V delayed = hn::NegMulAdd(of_(DriveParameter::delay),
@@ -187,12 +202,49 @@ class Rollout {
     return hn::MulAdd(hn::Sub(place, below), hn::Sub(right, left), left);
   }
 
+  // Time in samples at which a command acts that is `place` old, of each lane.
+  HWY_INLINE V commanded_place(double place) const {
+    if (!has_delay_ || is_law_delayed_) return constant(place);
+    return hn::NegMulAdd(of_(DriveParameter::delay), constant(1.0 / log_.sample_period_s),
+                         constant(place));
+  }
+
+  // The integral of the command from the sample before a place to it, and that sample; constant before and after the log.
+  HWY_INLINE void move_to(V place) {
+    const V last = constant(static_cast<double>(log_.size() - 2));
+    cell_ = hn::Min(hn::Max(hn::Floor(place), hn::Zero(D())), last);
+    const auto index = hn::ConvertTo(Index(), cell_);
+    left_ = hn::GatherIndex(D(), log_.command.data(), index);
+    right_ = hn::GatherIndex(D(), command_end_, index);
+    const V share = hn::Sub(place, cell_);
+    const V within_cell = hn::Min(hn::Max(share, hn::Zero(D())), constant(1.0));
+    const V outside = hn::Mul(hn::Sub(share, within_cell),
+                              hn::IfThenElse(hn::Lt(share, hn::Zero(D())), left_, right_));
+    const V mean = hn::MulAdd(hn::Mul(constant(0.5), within_cell), hn::Sub(right_, left_), left_);
+    integral_ = hn::MulAdd(within_cell, mean, outside);
+  }
+
+  // The mean over the kick, so that a jump acts at its time and not at that of a step. A kick crosses one sample at most.
+  HWY_INLINE V mean_command(std::size_t sample, double fraction) {
+    const double half = 0.5 * step_s_ / log_.sample_period_s;
+    const V cell = cell_;
+    const V rest = hn::NegMulAdd(constant(-0.5), hn::Add(left_, right_), hn::Neg(integral_));
+    const V begun = integral_;
+    move_to(commanded_place(static_cast<double>(sample) + fraction + half));
+    const V passed =
+        hn::IfThenElse(hn::Eq(cell, cell_), hn::Sub(integral_, begun), hn::Add(rest, integral_));
+    return hn::Mul(passed, constant(log_.sample_period_s / kick_s_));
+  }
+
   HWY_INLINE V law_torque(V goal) {
     filtered_speed_ = hn::MulAdd(speed_share_, hn::Sub(speed_, filtered_speed_), filtered_speed_);
     V wanted = hn::Mul(constant(log_.gain), hn::Sub(goal, angle_));
     wanted = hn::NegMulAdd(constant(log_.speed_gain), filtered_speed_, wanted);
-    wanted = within(wanted, constant(log_.limit));
-    return has_delay_ ? delayed(wanted) : wanted;
+    const V limited = within(wanted, constant(log_.limit));
+    if (has_delay_) return delayed(limited);
+    if (log_.speed_filter_rad_s <= 0.0)
+      motor_damping_ = hn::IfThenElseZero(hn::Eq(limited, wanted), constant(log_.speed_gain));
+    return limited;
   }
 
   // `wanted` as it was one delay ago, interpolated in the ring of past values.
@@ -220,7 +272,6 @@ class Rollout {
   }
 
   HWY_INLINE V winding_torque(V duty) {
-    electric_damping_ = hn::Zero(D());
     if (power_ == 0.0 && !log_.brakes_when_off) return hn::Zero(D());
     const V size = hn::Abs(duty);
     if (has_exponent_) {
@@ -238,7 +289,7 @@ class Rollout {
     // The power switches all of the torque of an open winding, and the duty of one that is shorted.
     const double closed = log_.brakes_when_off ? 1.0 : power_;
     const V Nm_V = hn::Mul(constant(closed), hn::Div(constant_Nm_A, resistance));
-    electric_damping_ = hn::Mul(Nm_V, constant_Nm_A);
+    motor_damping_ = hn::Mul(Nm_V, constant_Nm_A);
     const V voltage = hn::NegMulAdd(
         constant_Nm_A, speed_,
         hn::Mul(constant(log_.supply_V * (log_.brakes_when_off ? power_ : 1.0)), duty));
@@ -246,15 +297,18 @@ class Rollout {
   }
 
   // What the supply leaves of a commanded torque at this speed.
-  HWY_INLINE V within_supply(V torque) const {
+  HWY_INLINE V within_supply(V torque) {
     if (!has_speed_limit_) return torque;
     const V stall = of_(DriveParameter::stall_torque);
     const V lost = hn::Mul(speed_slope_, speed_);
-    return hn::Min(hn::Max(torque, hn::Neg(hn::Add(stall, lost))), hn::Sub(stall, lost));
+    const V limited = hn::Min(hn::Max(torque, hn::Neg(hn::Add(stall, lost))), hn::Sub(stall, lost));
+    motor_damping_ = hn::IfThenElse(hn::Eq(limited, torque), motor_damping_, speed_slope_);
+    return limited;
   }
 
   HWY_INLINE V motor_torque(std::size_t sample, double fraction) {
-    const V input = command(sample, fraction);
+    motor_damping_ = hn::Zero(D());
+    const V input = is_second_order_ ? mean_command(sample, fraction) : command(sample, fraction);
     switch (log_.kind) {
       case CommandKind::goal_to_duty:
         return winding_torque(
@@ -286,7 +340,7 @@ class Rollout {
 
   // The inertia with which a kick by the torques at the old speed has the mean of `damping` over the step.
   HWY_INLINE V effective_inertia(V inertia, V damping) const {
-    return is_second_order_ ? hn::MulAdd(constant(0.5 * kick_s_), damping, inertia) : inertia;
+    return hn::MulAdd(constant(implicit_share_ * kick_s_), damping, inertia);
   }
 
   // On the motor's side: what opposes `driving`, the sum of all other torques.
@@ -312,8 +366,13 @@ class Rollout {
     return hn::MulAdd(constant(kick_s_), hn::Div(torque, inertia), speed);
   }
 
+  // The damping of a winding has its power already; that of a law does not act without power.
+  HWY_INLINE double power_damping() const { return has_winding(log_.kind) ? 1.0 : power_; }
+
   HWY_INLINE V motor_inertia() const {
-    return effective_inertia(inertia_, hn::Add(electric_damping_, of_(DriveParameter::viscous)));
+    const V viscous = of_(DriveParameter::viscous);
+    return effective_inertia(inertia_,
+                             hn::MulAdd(constant(power_damping()), motor_damping_, viscous));
   }
 
   HWY_INLINE void step(std::size_t sample, double fraction) {
@@ -380,7 +439,8 @@ class Rollout {
       has_speed_limit_, has_spring_;
   bool has_hysteresis_, has_backlash_, has_presliding_, is_law_delayed_;
   bool is_second_order_;
-  double power_ = 1.0;  ///< share of the kick in which the power is on
+  double implicit_share_;  ///< of the damping, that acts at the new speed
+  double power_ = 1.0;     ///< share of the kick in which the power is on
   std::size_t substeps_ = 1;
   double step_s_ = 0.0;
   double kick_s_ = 0.0;  ///< time for which torques act on the speeds: half a step at first
@@ -391,7 +451,8 @@ class Rollout {
   V speed_share_;
   V angle_, speed_, filtered_speed_, joint_angle_, joint_speed_;
   V bristle_ = hn::Zero(D()), stop_ = hn::Zero(D()), joint_torque_ = hn::Zero(D());
-  V electric_damping_ = hn::Zero(D());
+  V motor_damping_ = hn::Zero(D());
+  V cell_ = hn::Zero(D()), left_ = hn::Zero(D()), right_ = hn::Zero(D()), integral_ = hn::Zero(D());
   double max_steps_ = 0.0;  ///< length of the delay
   std::size_t newest_ = 0;
   std::size_t ring_mask_ = 0;

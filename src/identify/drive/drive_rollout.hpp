@@ -35,11 +35,13 @@ struct DriveRun {
 };
 
 enum class DriveIntegrator : std::uint8_t {
-  /// Second order: speeds are those in the middle of a step, and the damping by viscous friction and by the winding is
+  /// Second order, but for the damping of the spring and of a law with delay or filter: speeds are those in the middle of a step, and the damping by viscous friction and by the winding is
   /// the mean over the step.
   midpoint_speed,
   /// First order, with forces from the beginning of a step: what other simulators have.
   semi_implicit_euler,
+  /// The same with the damping by viscous friction and by the winding at the end of a step, as MuJoCo's Euler has it.
+  implicit_damping,
 };
 
 struct RolloutOptions {

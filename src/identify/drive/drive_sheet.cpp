@@ -39,7 +39,7 @@ DriveLaw law_of(const YamlValue& value) {
 
 /// Keys of one law in addition to those of all.
 void require_keys(const YamlValue& drive, DriveLaw law) {
-  std::vector<std::string> keys{"law", "command", "angle", "gear_ratio"};
+  std::vector<std::string> keys{"law", "command", "between_samples", "angle", "gear_ratio"};
   const auto with = [&](std::initializer_list<const char*> more) {
     keys.insert(keys.end(), more.begin(), more.end());
   };
@@ -125,6 +125,12 @@ DriveSheet sheet_from(const YamlValue& root, const std::string& name) {
   sheet.law = law_of(drive.at("law"));
   require_keys(drive, sheet.law);
   if (const auto command = drive.find("command")) sheet.command = command_of(*command, sheet.law);
+  if (const auto between = drive.find("between_samples")) {
+    const std::string text = between->text();
+    if (text != "held" && text != "linear")
+      between->refuse("held or linear: the command between two samples");
+    sheet.is_command_held = text == "held";
+  }
   if (const auto angle = drive.find("angle")) sheet.angle = channel_in(*angle, {"rad"});
   if (const auto ratio = drive.find("gear_ratio")) {
     const double value = ratio->plain_number(1e5);

@@ -1,8 +1,12 @@
 #include "identify/drive/error_gain.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "identify/drive/drive_findings.hpp"
 #include "identify/drive/drive_logs.hpp"
 #include "joint_load/load_fact.hpp"
 #include "numerics/quantile.hpp"
@@ -13,6 +17,7 @@ namespace {
 
 /// What the law of one recording reads and commands.
 struct LawSignals {
+  std::string recording;
   double sample_period_s = 0.0;
   double gain = 0.0;
   std::vector<double> goal_rad;
@@ -26,7 +31,8 @@ std::vector<LawSignals> law_signals(const std::vector<Recording>& recordings,
   std::vector<LawSignals> all;
   for (const Recording& recording : recordings) {
     if (!recording.has("duty_1")) continue;
-    all.push_back({.sample_period_s = 1.0 / recording.sample_rate_Hz(),
+    all.push_back({.recording = recording.name(),
+                   .sample_period_s = 1.0 / recording.sample_rate_Hz(),
                    .gain = fact_in(sheet.gain, recording, sheet.file, "gain"),
                    .goal_rad = finite_channel(recording, command_channel(recording, sheet)),
                    .angle_rad = angle_after_gear(recording, sheet),
@@ -120,13 +126,87 @@ double standard_error(const std::vector<ErrorGainSums>& parts) {
   return std::sqrt((count - 1.0) / count * square);
 }
 
-void require_measurable(const ErrorGainSums& sums, const DriveSheet& sheet) {
+double gain_of(const ErrorGainSums& sums) {
+  return sums.square > 0.0 ? sums.product / sums.square : kNotMeasured;
+}
+
+void check_residual(const ErrorGainSums& sums, DriveFindings& findings) {
+  constexpr double kLargest = 0.05;
+  if (residual(sums) <= kLargest) return;
+  findings.warn(
+      "error gain",
+      fmt::format("The duty differs from gain error_gain (goal - angle) by {:.2g} (RMS): "
+                  "the law is another one, or goal, angle and duty do not belong together. "
+                  "Check the gain and the columns, or state another law.",
+                  residual(sums)));
+}
+
+/// A recording whose gain is stated wrongly has another error gain than the rest.
+void check_gains(const std::vector<LawSignals>& signals, const std::vector<ErrorGainSums>& parts,
+                 DriveFindings& findings) {
+  constexpr double kDiffers = 1.2;
+  std::vector<double> gains;
+  for (const ErrorGainSums& part : parts)
+    if (part.samples >= kFewestDriveSamples && gain_of(part) > 0.0) gains.push_back(gain_of(part));
+  if (gains.size() < 3) return;
+  const double middle = quantile(gains, 0.5);
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const double ratio = gain_of(parts[k]) / middle;
+    if (parts[k].samples < kFewestDriveSamples || !(ratio > 0.0) ||
+        (ratio < kDiffers && ratio > 1.0 / kDiffers))
+      continue;
+    findings.warn(
+        "error gain",
+        fmt::format("The duty of {} follows the error {:.2f} times as strongly as that of "
+                    "the other recordings: its gain, {:.4g}, is not the one that it was "
+                    "recorded with.",
+                    signals[k].recording, ratio, signals[k].gain));
+  }
+}
+
+/// A limit shows as a largest value that the duty has again and again.
+void check_limit_of_duty(const std::vector<LawSignals>& signals, double max_duty_1,
+                         DriveFindings& findings) {
+  double largest = 0.0;
+  for (const LawSignals& each : signals)
+    for (const double duty : each.duty_1) largest = std::max(largest, std::abs(duty));
+  constexpr double kNear = 0.999;
+  constexpr std::size_t kRepeated = 20;
+  std::size_t at_limit = 0;
+  for (const LawSignals& each : signals)
+    at_limit += static_cast<std::size_t>(std::ranges::count_if(
+        each.duty_1, [&](double duty) { return std::abs(duty) >= kNear * largest; }));
+  constexpr double kBelow = 0.98;
+  if (largest <= 0.0 || largest >= kBelow * max_duty_1 || at_limit < kRepeated) return;
+  findings.warn(
+      "duty limit",
+      fmt::format("The duty reaches {:.4g} in {} samples and never more, and the drive file "
+                  "has the limit {:.4g}. If the drive limits it there, state 'max_duty: "
+                  "{:.4g}'.",
+                  largest, at_limit, max_duty_1, largest));
+}
+
+std::string why_not_measurable(const ErrorGainSums& sums, const std::vector<LawSignals>& signals) {
+  const bool is_passive =
+      !signals.empty() && std::ranges::all_of(signals, [](const LawSignals& each) {
+        return std::ranges::all_of(each.duty_1, [](double duty) { return duty == 0.0; });
+      });
+  if (is_passive) return "a duty of 0 in all recordings, which are without power";
+  if (sums.samples == 0) return "no recording with duty_1 below its limit";
+  if (sums.product < 0.0)
+    return "a duty that pushes the angle away from the goal: goal, angle or duty has the other "
+           "sign "
+           "('sign: -1' of its channel in a mapping)";
+  return "a duty that does not follow the error";
+}
+
+void require_measurable(const ErrorGainSums& sums, const std::vector<LawSignals>& signals,
+                        const DriveSheet& sheet) {
   if (sums.samples >= kFewestDriveSamples && sums.square > 0.0 && sums.product > 0.0) return;
   throw Error({.place = sheet.file,
                .expected = "error_gain, the duty for an error of 1 rad at gain 1, or duty_1 in "
                            "the recordings to measure it from",
-               .found = sums.samples == 0 ? "no recording with duty_1 below its limit"
-                                          : "a duty that does not follow the error",
+               .found = why_not_measurable(sums, signals),
                .advice = "State 'error_gain' in the drive file (--drive)."});
 }
 
@@ -151,7 +231,7 @@ MeasuredDrive measured_drive(const std::vector<Recording>& recordings, const Dri
     best_delay_s = delay_s;
   }
   const ErrorGainSums sums = total(best);
-  require_measurable(sums, sheet);
+  require_measurable(sums, signals, sheet);
   const double gain = sums.product / sums.square;
   measured.sheet.error_gain_1_rad = gain;
   measured.error_gain = {.value_1_rad = gain,
@@ -159,6 +239,11 @@ MeasuredDrive measured_drive(const std::vector<Recording>& recordings, const Dri
                          .delay_s = best_delay_s,
                          .residual_duty_1 = residual(sums),
                          .samples = sums.samples};
+  DriveFindings findings;
+  check_residual(sums, findings);
+  check_gains(signals, best, findings);
+  check_limit_of_duty(signals, sheet.max_duty_1, findings);
+  measured.findings = findings.take();
   return measured;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "core/aligned_vector.hpp"
@@ -161,6 +162,7 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
   identified.load = load;
   identified.error_gain = measured.error_gain;
   identified.findings = check_drive_logs(recordings, logs);
+  std::ranges::copy(measured.findings, std::back_inserter(identified.findings));
   require_usable(identified.findings);
   identified.recordings.resize(logs.size());
   const DriveFitOptions fit{.starts = options.starts,

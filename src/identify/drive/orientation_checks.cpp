@@ -64,7 +64,6 @@ std::array<double, kOrientations.size()> errors_of_orientations(const std::vecto
   const std::vector<DriveLog> some = some_of(logs);
   DriveFitOptions quick = options;
   quick.starts = 1;
-  quick.progress = {};
   const DriveTerms terms = drive_terms({DriveTerm::base});
   std::array<double, kOrientations.size()> errors_rad{};
   for_each_chunk(kOrientations.size(), threads, [&](std::size_t k) {
@@ -77,14 +76,15 @@ std::array<double, kOrientations.size()> errors_of_orientations(const std::vecto
   return errors_rad;
 }
 
-std::string what_to_turn(const Orientation& orientation) {
+/// @param stated_rad zero of the load that is stated
+std::string what_to_turn(const Orientation& orientation, double stated_rad) {
   std::string sign =
       "the angle counts in the other direction than the command: reverse its sign ('sign: -1' of "
       "its channel in a mapping)";
   std::string zero = fmt::format(
-      "the angle is not 0 where the load hangs: state 'zero: {:.0f}deg' in the load file "
-      "(besides one that it states), or shift the angle",
-      deg_from_rad(orientation.zero_rad));
+      "the angle is not 0 where the load hangs: state 'zero: {:.0f}deg' in the load file, or "
+      "shift goal and angle",
+      deg_from_rad(stated_rad + orientation.zero_rad));
   if (orientation.zero_rad == 0.0) return sign;
   return orientation.is_mirrored ? sign + ", and " + zero : zero;
 }
@@ -122,12 +122,12 @@ std::vector<DriveFinding> check_free_runs(const std::vector<DriveLog>& logs,
   if (is_explained)
     findings.fail(
         "direction and zero",
-        found +
-            fmt::format(
-                "With the base of the model the error falls from {:.3g} to "
-                "{:.3g} rad if {}.",
-                errors_rad.front(), *best,
-                what_to_turn(kOrientations[static_cast<std::size_t>(best - errors_rad.begin())])));
+        found + fmt::format(
+                    "With the base of the model the error falls from {:.3g} to "
+                    "{:.3g} rad if {}.",
+                    errors_rad.front(), *best,
+                    what_to_turn(kOrientations[static_cast<std::size_t>(best - errors_rad.begin())],
+                                 logs.front().load.load.zero_rad)));
   else
     findings.fail("direction and zero", found + likely_causes(identified.findings));
   return findings.take();

@@ -88,6 +88,7 @@ SheetJson load_sheet_json(const LoadSheet& load) {
 SheetJson drive_sheet_json(const DriveSheet& drive) {
   SheetJson document{{"law", name(drive.law)}};
   if (!drive.command.empty()) document["command"] = drive.command;
+  if (drive.is_command_held) document["between_samples"] = "held";
   if (!drive.angle.empty()) document["angle"] = drive.angle;
   if (drive.gear_ratio) document["gear_ratio"] = *drive.gear_ratio;
   if (drive.law == DriveLaw::position) {

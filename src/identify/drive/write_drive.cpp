@@ -102,6 +102,20 @@ std::string joined_terms(const std::vector<std::string>& names) {
   return names.empty() ? "nothing" : joined(names);
 }
 
+/// What a friction model of BAM has. m1 has neither the Stribeck effect nor load, m2 no load, m3 no Stribeck effect.
+DriveTerms terms_of_bam(BamModel model) {
+  using enum DriveTerm;
+  switch (model) {
+    case BamModel::m1: return drive_terms({base});
+    case BamModel::m2: return drive_terms({base, stribeck});
+    case BamModel::m3: return drive_terms({base, load_friction});
+    case BamModel::m4: return drive_terms({base, stribeck, load_friction, load_stribeck});
+    case BamModel::m5:
+    case BamModel::m6: break;
+  }
+  return drive_terms({base, stribeck, load_friction, load_stribeck, direction});
+}
+
 WrittenDrive write_bam(const DriveIdentification& identified, const std::vector<DriveLog>& logs,
                        const std::string& actuator, const IdentifyOptions& options) {
   const GroupedLogs all = grouped(pointers_to(logs));
@@ -109,15 +123,11 @@ WrittenDrive write_bam(const DriveIdentification& identified, const std::vector<
   const BamModel model = best_bam_model(all, fit, options.threads);
   const DriveProblem problem = bam_problem(all.logs, model);
   const DriveSolution solution = fit_problem(problem, typical_bam(), fit);
-  WrittenDrive written{
-      .text = "{\n",
-      .mae_rad = score_drive(problem, solution.values).mae_rad,
-      .own_mae_rad = identified.mae_rad,
-      .model = std::string(name(model)),
-      .not_expressed = other_terms(
-          identified.terms,
-          drive_terms({DriveTerm::base, DriveTerm::load_friction, DriveTerm::load_stribeck,
-                       DriveTerm::stribeck, DriveTerm::direction}))};
+  WrittenDrive written{.text = "{\n",
+                       .mae_rad = score_drive(problem, solution.values).mae_rad,
+                       .own_mae_rad = identified.mae_rad,
+                       .model = std::string(name(model)),
+                       .not_expressed = other_terms(identified.terms, terms_of_bam(model))};
   if (identified.drive.brakes_when_off && has_passive_run(logs))
     written.not_expressed.emplace_back("the shorted winding without power");
   written.text +=
@@ -139,17 +149,20 @@ struct Refitted {
   DriveTerms terms;
   DriveValues values{};
   double step_s = 0.0;
+  DriveFitOptions options = {};
   double mae_rad = 0.0;
 };
 
 Refitted refitted(const DriveIdentification& identified, const std::vector<DriveLog>& logs,
-                  const DriveTerms& kept, double step_s, const IdentifyOptions& options) {
+                  const DriveTerms& kept, double step_s, DriveIntegrator integrator,
+                  const IdentifyOptions& options) {
   Refitted result{.terms = identified.terms & kept};
   DriveFitOptions fit = fit_options(options);
   const double steps = std::max(1.0, std::ceil(logs.front().sample_period_s / step_s - 1e-6));
   fit.step_s = logs.front().sample_period_s / steps;
-  fit.integrator = DriveIntegrator::semi_implicit_euler;  // as in MuJoCo and Isaac Lab
+  fit.integrator = integrator;
   result.step_s = fit.step_s;
+  result.options = fit;
   const DriveLogs all = pointers_to(logs);
   result.values = fit_drive(all, result.terms, fit).values;
   result.mae_rad = score_drive(drive_problem(all, result.terms, fit), result.values).mae_rad;
@@ -255,7 +268,8 @@ WrittenDrive write_mjcf(const DriveIdentification& identified, const std::vector
   // The hinge of the load turns against the motor, so that it cannot have the friction of the joint's bearing.
   const DriveTerms kept =
       drive_terms({DriveTerm::base, DriveTerm::spring, DriveTerm::joint_inertia});
-  const Refitted fit = refitted(identified, logs, kept, 0.002, options);
+  const Refitted fit =
+      refitted(identified, logs, kept, 0.002, DriveIntegrator::implicit_damping, options);
   const ServoGains gains = servo_gains(log, fit.values);
   WrittenDrive written{.text = {},
                        .mae_rad = fit.mae_rad,
@@ -288,8 +302,7 @@ struct LabActuator {
 /// DCMotorCfg has the limit of the supply and needs its speed, DelayedPDActuatorCfg has the delay, and none has both.
 LabActuator lab_actuator(const DriveLog& log, const Refitted& fit, const ServoGains& gains) {
   using enum DriveParameter;
-  const auto delay_steps =
-      static_cast<long>(std::lround(std::max(at(fit.values, delay), 0.0) / fit.step_s));
+  const auto delay_steps = std::lround(at(fit.values, delay) / fit.step_s);
   if (delay_steps > 0)
     return {"DelayedPDActuatorCfg",
             fmt::format("    min_delay={0},\n    max_delay={0},\n", delay_steps)};
@@ -311,7 +324,13 @@ WrittenDrive write_isaaclab(const DriveIdentification& identified,
   const DriveTerms kept = has(identified.terms, DriveTerm::speed_limit)
                               ? drive_terms({DriveTerm::base, DriveTerm::speed_limit})
                               : drive_terms({DriveTerm::base, DriveTerm::delay});
-  const Refitted fit = refitted(identified, logs, kept, 0.005, options);
+  Refitted fit =
+      refitted(identified, logs, kept, 0.005, DriveIntegrator::semi_implicit_euler, options);
+  if (at(fit.values, delay) < 0.0 || has(kept, DriveTerm::speed_limit)) at(fit.values, delay) = 0.0;
+  // The file has whole steps.
+  at(fit.values, delay) = fit.step_s * std::round(at(fit.values, delay) / fit.step_s);
+  fit.mae_rad =
+      score_drive(drive_problem(pointers_to(logs), fit.terms, fit.options), fit.values).mae_rad;
   const ServoGains gains = servo_gains(log, fit.values);
   WrittenDrive written{.text = {},
                        .mae_rad = fit.mae_rad,
@@ -320,7 +339,7 @@ WrittenDrive write_isaaclab(const DriveIdentification& identified,
                        .not_expressed = other_terms(identified.terms, kept)};
   const LabActuator lab = lab_actuator(log, fit, gains);
   if (has(fit.terms, DriveTerm::delay) && lab.configuration != "DelayedPDActuatorCfg")
-    written.not_expressed.emplace_back("delay, shorter than half a physics step");
+    written.not_expressed.emplace_back("a delay shorter than half a physics step");
   if (log.kind == CommandKind::goal_to_duty && lab.configuration != "DCMotorCfg")
     written.not_expressed.emplace_back("the limit of the supply at speed");
   add_what_servos_lack(logs, written);

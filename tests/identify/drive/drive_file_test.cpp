@@ -106,7 +106,8 @@ TEST(DriveFile, KeepsEachLaw) {
        {"drive: {law: pd, kp: 300Nm_rad, kd: kd_Nms_rad, filter: 40Hz, torque_limit: 28Nm, "
         "gear_ratio: 50}",
         "drive: {law: voltage, supply: supply_V, off: short, angle: gear_angle_rad}",
-        "drive: {law: current}", "drive: {law: torque, command: wanted_Nm}"}) {
+        "drive: {law: current, between_samples: held}",
+        "drive: {law: torque, command: wanted_Nm}"}) {
     DriveIdentification other = one_servo();
     other.drive = parse_drive_sheet(text, "drive.yaml");
     const DriveSheet read =
@@ -114,6 +115,7 @@ TEST(DriveFile, KeepsEachLaw) {
     EXPECT_EQ(read.law, other.drive.law) << text;
     EXPECT_EQ(read.command, other.drive.command) << text;
     EXPECT_EQ(read.angle, other.drive.angle) << text;
+    EXPECT_EQ(read.is_command_held, other.drive.is_command_held) << text;
     EXPECT_EQ(read.gear_ratio, other.drive.gear_ratio) << text;
     EXPECT_EQ(read.kp_Nm_rad.value, other.drive.kp_Nm_rad.value) << text;
     EXPECT_EQ(read.kd_Nms_rad.condition, other.drive.kd_Nms_rad.condition) << text;

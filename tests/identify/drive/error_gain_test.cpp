@@ -1,14 +1,21 @@
 #include "identify/drive/error_gain.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
+#include <string>
 #include <vector>
+
+#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
+
+using ::testing::HasSubstr;
 
 constexpr double kErrorGain_1_rad = 0.11;
 
@@ -68,6 +75,70 @@ TEST(MeasuredDrives, OfOneRecordingHaveNoStandardError) {
   const MeasuredDrive measured =
       measured_drive(recordings, assumed_drive_sheet(recordings.front()));
   EXPECT_TRUE(std::isnan(measured.error_gain->standard_error_1_rad));
+}
+
+std::vector<Recording> three_steps() {
+  return {steps(0.0, 0.002, 1), steps(0.0, 0.002, 2), steps(0.0, 0.002, 3)};
+}
+
+/// A recording with another duty.
+Recording with_duty(const Recording& from, const std::function<double(double)>& change) {
+  Recording changed(from.name(), from.sample_rate_Hz());
+  for (Channel channel : from.channels()) {
+    if (channel.name == "duty_1")
+      for (double& value : channel.values) value = change(value);
+    changed.add(std::move(channel));
+  }
+  return changed;
+}
+
+std::string findings_text(const std::vector<Recording>& recordings) {
+  std::string text;
+  for (const DriveFinding& finding :
+       measured_drive(recordings, assumed_drive_sheet(recordings.front())).findings)
+    text += finding.subject + ": " + finding.text + "\n";
+  return text;
+}
+
+TEST(MeasuredDrives, RemarkNothingOfADutyThatFollowsItsLaw) {
+  EXPECT_EQ(findings_text(three_steps()), "");
+}
+
+TEST(MeasuredDrives, NameARecordingOfAnotherGain) {
+  std::vector<Recording> recordings = three_steps();
+  recordings[1] = with_duty(recordings[1], [](double duty) { return 2.0 * duty; });
+  EXPECT_THAT(findings_text(recordings), HasSubstr("2.00 times as strongly"));
+}
+
+TEST(MeasuredDrives, RemarkALimitBelowThatOfTheFile) {
+  std::vector<Recording> recordings = three_steps();
+  for (Recording& recording : recordings)
+    recording = with_duty(recording, [](double duty) { return std::clamp(duty, -0.3, 0.3); });
+  EXPECT_THAT(findings_text(recordings), HasSubstr("state 'max_duty: 0.3'"));
+}
+
+TEST(MeasuredDrives, RemarkADutyOfAnotherLaw) {
+  std::vector<Recording> recordings = three_steps();
+  int n = 0;
+  for (Recording& recording : recordings)
+    recording = with_duty(recording, [&](double duty) { return duty + 0.1 * (n++ % 2 * 2 - 1); });
+  EXPECT_THAT(findings_text(recordings), HasSubstr("the law is another one"));
+}
+
+TEST(MeasuredDrives, NameTheSignAndThePower) {
+  const auto refusal = [](double factor) -> std::string {
+    std::vector<Recording> recordings = three_steps();
+    for (Recording& recording : recordings)
+      recording = with_duty(recording, [&](double duty) { return factor * duty; });
+    try {
+      (void)measured_drive(recordings, assumed_drive_sheet(recordings.front()));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(refusal(-1.0), HasSubstr("has the other sign"));
+  EXPECT_THAT(refusal(0.0), HasSubstr("without power"));
 }
 
 }  // namespace

@@ -29,6 +29,8 @@ struct DriveSheet {
   std::string command;  ///< channel; empty: by the law (`command_channels`)
   std::string
       angle;  ///< channel; empty: motor_angle_rad, gear_angle_rad or joint_angle_rad, the first that exists
+  bool is_command_held =
+      false;  ///< each sample of the command until the next one; else linear between them
   std::optional<double> gear_ratio;  ///< empty: the condition gear_ratio_1, else 1
   LoadFact gain = {.value = 1.0};    ///< position: a number that multiplies `error_gain_1_rad`
   std::optional<double>
