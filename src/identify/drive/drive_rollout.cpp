@@ -439,7 +439,7 @@ class Rollout {
       has_speed_limit_, has_spring_;
   bool has_hysteresis_, has_backlash_, has_presliding_, is_law_delayed_;
   bool is_second_order_;
-  double implicit_share_;  ///< of the damping, that acts at the new speed
+  double implicit_share_;  ///< share of the damping that acts at the new speed
   double power_ = 1.0;     ///< share of the kick in which the power is on
   std::size_t substeps_ = 1;
   double step_s_ = 0.0;
