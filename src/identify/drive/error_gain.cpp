@@ -186,28 +186,34 @@ void check_limit_of_duty(const std::vector<LawSignals>& signals, double max_duty
                   largest, at_limit, max_duty_1, largest));
 }
 
-std::string why_not_measurable(const ErrorGainSums& sums, const std::vector<LawSignals>& signals) {
+/// Why no gain can be measured, and what to do.
+struct Unmeasurable {
+  std::string found;
+  std::string advice = "State 'error_gain' in the drive file (--drive).";
+};
+
+Unmeasurable why_not_measurable(const ErrorGainSums& sums, const std::vector<LawSignals>& signals) {
   const bool is_passive =
       !signals.empty() && std::ranges::all_of(signals, [](const LawSignals& each) {
         return std::ranges::all_of(each.duty_1, [](double duty) { return duty == 0.0; });
       });
-  if (is_passive) return "a duty of 0 in all recordings, which are without power";
-  if (sums.samples == 0) return "no recording with duty_1 below its limit";
+  if (is_passive) return {"a duty of 0 in all recordings", "Give recordings with power as well."};
+  if (sums.samples == 0) return {"no recording with duty_1 below its limit"};
   if (sums.product < 0.0)
-    return "a duty that pushes the angle away from the goal: goal, angle or duty has the other "
-           "sign "
-           "('sign: -1' of its channel in a mapping)";
-  return "a duty that does not follow the error";
+    return {"a duty that pushes the angle away from the goal",
+            "Goal, angle or duty has the other sign: 'sign: -1' of its channel in a mapping."};
+  return {"a duty that does not follow the error"};
 }
 
 void require_measurable(const ErrorGainSums& sums, const std::vector<LawSignals>& signals,
                         const DriveSheet& sheet) {
   if (sums.samples >= kFewestDriveSamples && sums.square > 0.0 && sums.product > 0.0) return;
+  const Unmeasurable why = why_not_measurable(sums, signals);
   throw Error({.place = sheet.file,
                .expected = "error_gain, the duty for an error of 1 rad at gain 1, or duty_1 in "
                            "the recordings to measure it from",
-               .found = why_not_measurable(sums, signals),
-               .advice = "State 'error_gain' in the drive file (--drive)."});
+               .found = why.found,
+               .advice = why.advice});
 }
 
 }  // namespace

@@ -137,8 +137,8 @@ TEST(MeasuredDrives, NameTheSignAndThePower) {
     }
     return "no error";
   };
-  EXPECT_THAT(refusal(-1.0), HasSubstr("has the other sign"));
-  EXPECT_THAT(refusal(0.0), HasSubstr("without power"));
+  EXPECT_THAT(refusal(-1.0), HasSubstr("has the other sign: 'sign: -1'"));
+  EXPECT_THAT(refusal(0.0), HasSubstr("recordings with power"));
 }
 
 }  // namespace
