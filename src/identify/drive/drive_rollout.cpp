@@ -288,12 +288,12 @@ class Rollout {
     const V constant_Nm_A = of_(DriveParameter::torque_constant);
     // The power switches all of the torque of an open winding, and the duty of one that is shorted.
     const double closed = log_.brakes_when_off ? 1.0 : power_;
-    const V Nm_V = hn::Mul(constant(closed), hn::Div(constant_Nm_A, resistance));
-    motor_damping_ = hn::Mul(Nm_V, constant_Nm_A);
+    const V torque_per_volt = hn::Mul(constant(closed), hn::Div(constant_Nm_A, resistance));
+    motor_damping_ = hn::Mul(torque_per_volt, constant_Nm_A);
     const V voltage = hn::NegMulAdd(
         constant_Nm_A, speed_,
         hn::Mul(constant(log_.supply_V * (log_.brakes_when_off ? power_ : 1.0)), duty));
-    return hn::Mul(Nm_V, voltage);
+    return hn::Mul(torque_per_volt, voltage);
   }
 
   // What the supply leaves of a commanded torque at this speed.
