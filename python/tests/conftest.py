@@ -1,3 +1,5 @@
+import pathlib
+
 import numpy as np
 import pytest
 
@@ -37,3 +39,11 @@ def network(dataset) -> torsio.Model:
 def inputs(other_sweep, model) -> np.ndarray:
     """Rows for the model's estimator, shape (samples, channels)."""
     return np.column_stack([other_sweep[channel] for channel in model.estimator().raw_inputs])
+
+
+@pytest.fixture(scope="session")
+def pendulum_file(tmp_path_factory) -> pathlib.Path:
+    """The load file of simulated recordings in the air."""
+    path = tmp_path_factory.mktemp("load") / "load.yaml"
+    path.write_text("load: {pendulum: {mass: mass_kg, length: lever_m}}\n")
+    return path

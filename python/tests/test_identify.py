@@ -1,13 +1,10 @@
 import json
-import pathlib
 import xml.etree.ElementTree
 
 import numpy as np
 import pytest
 
 import torsio
-
-LOAD = "load: {pendulum: {mass: mass_kg, length: lever_m}}\n"
 
 
 def chirp(seed: int) -> torsio.Recording:
@@ -20,15 +17,8 @@ def chirps() -> list[torsio.Recording]:
 
 
 @pytest.fixture(scope="module")
-def load_file(tmp_path_factory) -> pathlib.Path:
-    path = tmp_path_factory.mktemp("load") / "load.yaml"
-    path.write_text(LOAD)
-    return path
-
-
-@pytest.fixture(scope="module")
-def identified(chirps, load_file) -> torsio.IdentifiedDrive:
-    return torsio.identify(chirps, load=load_file, terms=["load_friction"], starts=1)
+def identified(chirps, pendulum_file) -> torsio.IdentifiedDrive:
+    return torsio.identify(chirps, load=pendulum_file, terms=["load_friction"], starts=1)
 
 
 def test_parameters_have_errors_and_intervals(identified):
@@ -44,8 +34,8 @@ def test_parameters_have_errors_and_intervals(identified):
     assert "armature_kg_m2" in str(identified) and "<table>" in identified._repr_html_()
 
 
-def test_a_recording_without_a_repeat_is_remarked(chirps, load_file):
-    alone = torsio.identify(chirps[0], load=load_file, terms=[], starts=1)
+def test_a_recording_without_a_repeat_is_remarked(chirps, pendulum_file):
+    alone = torsio.identify(chirps[0], load=pendulum_file, terms=[], starts=1)
     remarks = {row["subject"]: row for row in alone.findings}
     assert remarks["recordings"]["status"] == "WARN"
     assert np.isnan(alone.parameters["armature_kg_m2"].standard_error)
@@ -90,13 +80,13 @@ def test_a_comment_of_xml_has_any_name_of_a_recording(identified, chirps, tmp_pa
     assert xml.etree.ElementTree.parse(path).getroot().tag == "mujoco"
 
 
-def test_mistakes_are_named(chirps, load_file, tmp_path):
+def test_mistakes_are_named(chirps, pendulum_file, tmp_path):
     with pytest.raises(torsio.UsageError, match="load_friction"):
-        torsio.identify(chirps, load=load_file, terms="delai")
+        torsio.identify(chirps, load=pendulum_file, terms="delai")
     with pytest.raises(torsio.UsageError, match="recordings"):
-        torsio.identify([], load=load_file)
+        torsio.identify([], load=pendulum_file)
     with pytest.raises(torsio.UsageError, match="found a int"):
-        torsio.identify([3], load=load_file)
+        torsio.identify([3], load=pendulum_file)
     broken = tmp_path / "broken.json"
     broken.write_text("{}")
     with pytest.raises(torsio.Error, match="drive_format"):

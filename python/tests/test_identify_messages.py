@@ -1,12 +1,8 @@
 """What `identify` and its result refuse, by name, with what they expect."""
 
-import pathlib
-
 import pytest
 
 import torsio
-
-LOAD = "load: {pendulum: {mass: mass_kg, length: lever_m}}\n"
 
 
 @pytest.fixture(scope="module")
@@ -15,15 +11,8 @@ def chirp() -> torsio.Recording:
 
 
 @pytest.fixture(scope="module")
-def load_file(tmp_path_factory) -> pathlib.Path:
-    path = tmp_path_factory.mktemp("load") / "load.yaml"
-    path.write_text(LOAD)
-    return path
-
-
-@pytest.fixture(scope="module")
-def identified(chirp, load_file) -> torsio.IdentifiedDrive:
-    return torsio.identify(chirp, load=load_file, terms=[], starts=1)
+def identified(chirp, pendulum_file) -> torsio.IdentifiedDrive:
+    return torsio.identify(chirp, load=pendulum_file, terms=[], starts=1)
 
 
 @pytest.mark.parametrize(
@@ -41,9 +30,9 @@ def identified(chirp, load_file) -> torsio.IdentifiedDrive:
         ({"spring": "no"}, "spring: expected True or False, found str"),
     ],
 )
-def test_an_argument_of_another_type_is_named(chirp, load_file, argument, message):
+def test_an_argument_of_another_type_is_named(chirp, pendulum_file, argument, message):
     with pytest.raises(torsio.UsageError, match=message):
-        torsio.identify(chirp, **{"load": load_file, **argument})
+        torsio.identify(chirp, **{"load": pendulum_file, **argument})
 
 
 def test_the_result_names_an_argument_of_another_type(identified, chirp, tmp_path):

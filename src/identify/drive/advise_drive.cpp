@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/aligned_vector.hpp"
 #include "identify/drive/drive_course.hpp"
 #include "identify/drive/drive_fit.hpp"
 #include "identify/drive/drive_logs.hpp"
+#include "identify/drive/free_run.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/identify/drive/identify_drive.hpp"
@@ -27,10 +27,7 @@ struct CandidateLog {
 
 /// The identified drive's angle becomes that of the log, from `start` on.
 DriveLog simulated(DriveLog log, const DriveIdentification& identified, const DriveRun& start) {
-  DriveLanes lanes = DriveLanes::all(identified.values);
-  detail::AlignedVector<double> angles(log.size() * kDriveLanes);
-  roll_out(log, start, lanes, {identified.terms, identified.step_s}, {.angle_rad = angles.data()});
-  for (std::size_t n = 0; n < log.size(); ++n) log.angle_rad[n] = angles[n * kDriveLanes];
+  log.angle_rad = free_run(log, start, identified).angle_rad;
   return log;
 }
 
@@ -105,28 +102,34 @@ struct Candidate {
   Eigen::MatrixXd information;
 };
 
+/// A recording and how sharply it determines the parameters.
+struct InformativeLog {
+  const DriveLog* log;
+  Eigen::MatrixXd information;
+};
+
 /// The recording that moves the parameters most is the one to vary.
-std::size_t strongest_of(const std::vector<DriveLog>& logs, const Eigen::MatrixXd& covariance,
-                         const DriveIdentification& identified) {
-  std::size_t strongest = 0;
+InformativeLog strongest_of(const std::vector<DriveLog>& logs, const Eigen::MatrixXd& covariance,
+                            const DriveIdentification& identified) {
+  InformativeLog strongest{nullptr, {}};
   double most = 0.0;
-  for (std::size_t k = 0; k < logs.size(); ++k) {
-    const double gain = (covariance * information_of({&logs[k]}, identified).matrix).trace();
-    if (gain > most) {
-      most = gain;
-      strongest = k;
-    }
+  for (const DriveLog& log : logs) {
+    Eigen::MatrixXd information = information_of({&log}, identified).matrix;
+    const double gain = (covariance * information).trace();
+    if (strongest.log != nullptr && !(gain > most)) continue;
+    most = std::max(gain, 0.0);
+    strongest = {&log, std::move(information)};
   }
   return strongest;
 }
 
-std::vector<Candidate> candidates_of(const std::vector<DriveLog>& logs, const DriveLog& strongest,
+std::vector<Candidate> candidates_of(const std::vector<DriveLog>& logs, const InformativeLog& most,
                                      const DriveIdentification& identified) {
-  std::vector<Candidate> candidates;
+  const DriveLog& strongest = *most.log;
+  std::vector<Candidate> candidates{{strongest.name + " once more", most.information}};
   const auto add = [&](const CandidateLog& candidate) {
     candidates.push_back({candidate.text, information_of({&candidate.log}, identified).matrix});
   };
-  add({strongest.name + " once more", strongest});
   if (strongest.load.load.gravity_Nm > 0.0 && std::ranges::none_of(logs, [](const DriveLog& log) {
         return drive_course(log).has_passive_motion;
       }))
@@ -154,7 +157,7 @@ std::vector<DriveAdvice> advise_drive(const DriveIdentification& identified,
   before.matrix.diagonal().array() += 1e-9 * std::max(before.matrix.diagonal().maxCoeff(), 1e-300);
   const Eigen::MatrixXd covariance = before.matrix.inverse();
   const Eigen::VectorXd variance = covariance.diagonal();
-  const DriveLog& strongest = logs[strongest_of(logs, covariance, identified)];
+  const InformativeLog strongest = strongest_of(logs, covariance, identified);
   std::vector<DriveAdvice> advice;
   for (const Candidate& candidate : candidates_of(logs, strongest, identified)) {
     if (!candidate.information.allFinite()) continue;

@@ -104,6 +104,16 @@ std::vector<std::size_t> bam_rows(BamModel model) {
   return rows;
 }
 
+DriveTerms terms_of_bam(BamModel model) {
+  const BamTerms& terms = kTerms[static_cast<std::size_t>(model)];
+  DriveTerms all = drive_terms({DriveTerm::base});
+  if (terms.stribeck) all |= drive_terms({DriveTerm::stribeck});
+  if (terms.load) all |= drive_terms({DriveTerm::load_friction});
+  if (terms.load && terms.stribeck) all |= drive_terms({DriveTerm::load_stribeck});
+  if (terms.directional) all |= drive_terms({DriveTerm::direction});
+  return all;
+}
+
 void roll_out_bam(BamModel model, const DriveLog& log, const DriveRun& run,
                   const DriveLanes& parameters, double* angle_rad) {
   const BamTerms& terms = kTerms[static_cast<std::size_t>(model)];
@@ -120,7 +130,7 @@ void roll_out_bam(BamModel model, const DriveLog& log, const DriveRun& run,
       const double external = -load.gravity_Nm * std::sin(angle + load.zero_rad + of(row_offset));
       const double duty =
           std::clamp(log.gain * (log.command[sample] - angle), -log.limit, log.limit);
-      const bool is_on = log.enabled.empty() || log.enabled[sample] != 0.0;
+      const bool is_on = is_powered(log, sample);
       const double motor =
           is_on ? of(row_kt) / of(row_resistance) * (log.supply_V * duty - of(row_kt) * speed)
                 : 0.0;

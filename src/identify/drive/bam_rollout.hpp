@@ -29,6 +29,9 @@ struct BamParameter {
 /// Which of them a model has.
 [[nodiscard]] std::vector<std::size_t> bam_rows(BamModel model);
 
+/// What of torsio's friction a model has; its quadratic part is none of it.
+[[nodiscard]] DriveTerms terms_of_bam(BamModel model);
+
 /// The equations of BAM with the sample period as its step:
 ///
 ///     J q'' = tau_m + tau_e + tau_f,  tau_m = kt / R (u - kt q'), 0 while the power is off

@@ -23,14 +23,4 @@ struct DriveCourse {
 
 [[nodiscard]] DriveCourse drive_course(const DriveLog& log);
 
-/// Whether the power is on at a sample.
-[[nodiscard]] inline bool is_powered(const DriveLog& log, std::size_t sample) {
-  return log.enabled.empty() || log.enabled[sample] != 0.0;
-}
-
-/// Whether a law makes the command from an angle that is wanted.
-[[nodiscard]] constexpr bool follows_goal(CommandKind kind) {
-  return kind == CommandKind::goal_to_duty || kind == CommandKind::goal_to_torque;
-}
-
 }  // namespace torsio

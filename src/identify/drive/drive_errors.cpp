@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "numerics/jackknife.hpp"
 #include "numerics/parallel.hpp"
 #include "numerics/student_t.hpp"
 
@@ -30,18 +31,13 @@ std::vector<double> jackknife(const DriveProblem& problem, const std::vector<Dri
       if (k != left_out) rest.push_back(&logs[k]);
     without[left_out] = refit_drive(rest, terms, values, options).values;
   });
-  const auto count = static_cast<double>(logs.size());
   std::vector<double> variances;
   for (const SearchedDriveParameter& parameter : problem.searched) {
-    double mean = 0.0;
+    std::vector<double> values_without;
+    values_without.reserve(without.size());
     for (const DriveValues& fit : without)
-      mean += in_search(parameter, fit[parameter.index]) / count;
-    double square = 0.0;
-    for (const DriveValues& fit : without) {
-      const double away = in_search(parameter, fit[parameter.index]) - mean;
-      square += away * away;
-    }
-    variances.push_back((count - 1.0) / count * square);
+      values_without.push_back(in_search(parameter, fit[parameter.index]));
+    variances.push_back(jackknife_variance(values_without));
   }
   return variances;
 }

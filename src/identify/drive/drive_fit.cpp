@@ -200,9 +200,8 @@ std::vector<DriveValues> spring_starts(const DriveProblem& problem, const DriveV
 
 DriveLogs always_powered(const DriveLogs& logs) {
   DriveLogs powered;
-  std::ranges::copy_if(logs, std::back_inserter(powered), [](const DriveLog* log) {
-    return std::ranges::find(log->enabled, 0.0) == log->enabled.end();
-  });
+  std::ranges::copy_if(logs, std::back_inserter(powered),
+                       [](const DriveLog* log) { return is_always_powered(*log); });
   return powered;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -23,6 +24,11 @@ enum class CommandKind : std::uint8_t {
   return kind == CommandKind::goal_to_duty || kind == CommandKind::duty;
 }
 
+/// Whether a law makes the command from an angle that is wanted.
+[[nodiscard]] constexpr bool follows_goal(CommandKind kind) {
+  return kind == CommandKind::goal_to_duty || kind == CommandKind::goal_to_torque;
+}
+
 /// One recording as the free runs need it; the angle is that of the motor after the gear, or of the joint.
 struct DriveLog {
   std::string name;
@@ -44,5 +50,13 @@ struct DriveLog {
 
   [[nodiscard]] std::size_t size() const noexcept { return angle_rad.size(); }
 };
+
+/// Whether the power is on at a sample, or at all.
+[[nodiscard]] inline bool is_powered(const DriveLog& log, std::size_t sample) {
+  return log.enabled.empty() || log.enabled[sample] != 0.0;
+}
+[[nodiscard]] inline bool is_always_powered(const DriveLog& log) {
+  return std::ranges::find(log.enabled, 0.0) == log.enabled.end();
+}
 
 }  // namespace torsio

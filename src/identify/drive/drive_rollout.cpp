@@ -1,12 +1,8 @@
 #include "identify/drive/drive_rollout.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
-
-#include "core/aligned_vector.hpp"
 
 // Highway compiles this file once for each instruction set; the order of its headers matters.
 // clang-format off
@@ -15,17 +11,12 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 #include <hwy/contrib/math/math-inl.h>
+#include "identify/drive/command_lanes-inl.hpp"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
 namespace torsio::drive_rollout::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<double, kDriveLanes>;
-using V = hn::Vec<D>;
-using Index = hn::RebindToSigned<D>;
-
-HWY_INLINE V constant(double value) { return hn::Set(D(), value); }
 HWY_INLINE V within(V value, V limit) { return hn::Min(hn::Max(value, hn::Neg(limit)), limit); }
 HWY_INLINE V decay(V speed, V inverse_speed) {  // exp(-|v| / v_s)
   return hn::Exp(D(), hn::Max(hn::Neg(hn::Mul(hn::Abs(speed), inverse_speed)), constant(-700.0)));
@@ -50,38 +41,42 @@ class Rollout {
  public:
   HWY_INLINE Rollout(const DriveLog& log, const DriveRun& run, const DriveLanes& lanes,
                      std::size_t at, const RolloutOptions& options)
-      : log_(log), run_(run), of_(lanes, at), at_(at) {
+      : log_(log),
+        run_(run),
+        of_(lanes, at),
+        at_(at),
+        has_delay_(has(options.terms, DriveTerm::delay)),
+        is_second_order_(options.integrator == DriveIntegrator::midpoint_speed),
+        implicit_share_(implicit_share(options.integrator)),
+        substeps_(substeps_of(log, options)),
+        step_s_(log.sample_period_s / static_cast<double>(substeps_)),
+        kick_s_(is_second_order_ ? 0.5 * step_s_ : step_s_),
+        command_(log, delays_law() ? hn::Zero(D()) : delay()),
+        ring_(delay(), longest_delay_s(lanes), step_s_) {
     set_terms(options.terms);
-    is_law_delayed_ = log.kind == CommandKind::goal_to_torque;
-    command_end_ = log.command_end.empty() ? log.command.data() + 1 : log.command_end.data();
-    is_second_order_ = options.integrator == DriveIntegrator::midpoint_speed;
-    implicit_share_ = implicit_share(options.integrator);
-    substeps_ = static_cast<std::size_t>(std::ceil(log.sample_period_s / options.step_s - 1e-6));
-    substeps_ = std::max<std::size_t>(substeps_, 1);
-    step_s_ = log.sample_period_s / static_cast<double>(substeps_);
-    kick_s_ = is_second_order_ ? 0.5 * step_s_ : step_s_;
     set_constants();
-    if (has_delay_ && is_law_delayed_) make_ring(lanes);
     angle_ = constant(run.angle_rad);
     speed_ = constant(run.speed_rad_s);
     filtered_speed_ = speed_;
     joint_angle_ = has_spring_ ? hanging_joint() : angle_;
     joint_speed_ = speed_;
-    if (is_second_order_) move_to(commanded_place(static_cast<double>(run.first)));
+    if (is_second_order_) command_.move_to(static_cast<double>(run.first));
   }
+
   HWY_INLINE void run(const RolloutOutput& output) {
     for (std::size_t n = 0; n < run_.samples; ++n) {
       store(angle_, output.angle_rad, n);
       store(joint_angle_, output.joint_angle_rad, n);
       if (n + 1 == run_.samples && output.joint_torque_Nm == nullptr) return;
+      const std::size_t sample = run_.first + n;
+      const double power = power_at(sample);
+      // A kick around a sample has half of its time before it.
+      power_ = is_second_order_ && n > 0 ? 0.5 * (power + power_at(sample - 1)) : power;
       for (std::size_t k = 0; k < substeps_; ++k) {
-        // A kick around a sample has half of its time before it.
-        power_ = power_at(run_.first + n);
-        if (is_second_order_ && k == 0 && n > 0)
-          power_ = 0.5 * (power_ + power_at(run_.first + n - 1));
-        step(run_.first + n, static_cast<double>(k) / static_cast<double>(substeps_));
+        step(static_cast<double>(sample) + static_cast<double>(k) / static_cast<double>(substeps_));
         if (k == 0) store(joint_torque_, output.joint_torque_Nm, n);
         kick_s_ = step_s_;
+        power_ = power;
       }
     }
   }
@@ -96,9 +91,26 @@ class Rollout {
     return 0.0;
   }
 
+  static std::size_t substeps_of(const DriveLog& log, const RolloutOptions& options) {
+    const double steps = std::ceil(log.sample_period_s / options.step_s - 1e-6);
+    return std::max<std::size_t>(static_cast<std::size_t>(steps), 1);
+  }
+
+  static double longest_delay_s(const DriveLanes& lanes) {
+    return std::max(
+        0.0, *std::ranges::max_element(lanes.of[static_cast<std::size_t>(DriveParameter::delay)]));
+  }
+
+  [[nodiscard]] HWY_INLINE V delay() const {
+    return has_delay_ ? of_(DriveParameter::delay) : hn::Zero(D());
+  }
+  // A law that commands torque acts late as a whole.
+  [[nodiscard]] bool delays_law() const {
+    return has_delay_ && log_.kind == CommandKind::goal_to_torque;
+  }
+
   HWY_INLINE void set_terms(const DriveTerms& terms) {
     using enum DriveTerm;
-    has_delay_ = has(terms, delay);
     has_load_ = has(terms, load_friction);
     has_load_stribeck_ = has(terms, load_stribeck);
     has_stribeck_ = has(terms, stribeck);
@@ -132,23 +144,12 @@ class Rollout {
     speed_share_ = constant(log_.speed_filter_rad_s > 0.0 ? 1.0 - std::exp(-corner) : 1.0);
   }
 
-  // Room for the longest delay of the lanes.
-  HWY_INLINE void make_ring(const DriveLanes& lanes) {
-    constexpr double kMaxSteps = 1e6;
-    double longest_s = 0.0;
-    for (const double delay_s : lanes.of[static_cast<std::size_t>(DriveParameter::delay)])
-      longest_s = std::max(longest_s, delay_s);
-    max_steps_ = std::floor(std::min(longest_s / step_s_, kMaxSteps)) + 1.0;
-    ring_mask_ = std::bit_ceil(static_cast<std::size_t>(max_steps_) + 2) - 1;
-    ring_.resize((ring_mask_ + 1) * hn::MaxLanes(D()));
-  }
-
   HWY_INLINE void store(V value, double* out, std::size_t sample) const {
     if (out != nullptr) hn::Store(value, D(), out + sample * kDriveLanes + at_);
   }
 
   HWY_INLINE double power_at(std::size_t sample) const {
-    return log_.enabled.empty() || log_.enabled[sample] != 0.0 ? 1.0 : 0.0;
+    return is_powered(log_, sample) ? 1.0 : 0.0;
   }
 
   // The spring carries the load, as if it were at rest; without a start of the joint in the log that is the best guess.
@@ -182,58 +183,14 @@ class Rollout {
     return joint;
   }
 
-  // The command at a fraction of the period after a sample, interpolated between its stamps, except where it jumps.
-  HWY_INLINE V command(std::size_t sample, double fraction) const {
-    const auto last = static_cast<double>(log_.size() - 1);
-    const double now = static_cast<double>(sample) + fraction;
-    if (!has_delay_ || is_law_delayed_) {
-      const double place = std::min(now, last);
-      const auto below = std::min(static_cast<std::size_t>(place), log_.size() - 2);
-      const double share = place - static_cast<double>(below);
-      return constant(log_.command[below] + share * (command_end_[below] - log_.command[below]));
+  // With steps of second order it is the mean over the kick, so that a jump acts at its time and not at that of the step.
+  HWY_INLINE V command(double now) {
+    if (!is_second_order_) {
+      command_.move_to(now);
+      return command_.value();
     }
-    const V delayed = hn::NegMulAdd(of_(DriveParameter::delay),
-                                    constant(1.0 / log_.sample_period_s), constant(now));
-    const V place = hn::Min(hn::Max(delayed, hn::Zero(D())), constant(last - 1e-9));
-    const V below = hn::Floor(place);
-    const auto index = hn::ConvertTo(Index(), below);
-    const V left = hn::GatherIndex(D(), log_.command.data(), index);
-    const V right = hn::GatherIndex(D(), command_end_, index);
-    return hn::MulAdd(hn::Sub(place, below), hn::Sub(right, left), left);
-  }
-
-  // Time in samples at which a command acts that is `place` old, of each lane.
-  HWY_INLINE V commanded_place(double place) const {
-    if (!has_delay_ || is_law_delayed_) return constant(place);
-    return hn::NegMulAdd(of_(DriveParameter::delay), constant(1.0 / log_.sample_period_s),
-                         constant(place));
-  }
-
-  // The integral of the command from the sample before a place to it, and that sample; constant before and after the log.
-  HWY_INLINE void move_to(V place) {
-    const V last = constant(static_cast<double>(log_.size() - 2));
-    cell_ = hn::Min(hn::Max(hn::Floor(place), hn::Zero(D())), last);
-    const auto index = hn::ConvertTo(Index(), cell_);
-    left_ = hn::GatherIndex(D(), log_.command.data(), index);
-    right_ = hn::GatherIndex(D(), command_end_, index);
-    const V share = hn::Sub(place, cell_);
-    const V within_cell = hn::Min(hn::Max(share, hn::Zero(D())), constant(1.0));
-    const V outside = hn::Mul(hn::Sub(share, within_cell),
-                              hn::IfThenElse(hn::Lt(share, hn::Zero(D())), left_, right_));
-    const V mean = hn::MulAdd(hn::Mul(constant(0.5), within_cell), hn::Sub(right_, left_), left_);
-    integral_ = hn::MulAdd(within_cell, mean, outside);
-  }
-
-  // The mean over the kick, so that a jump acts at its time and not at that of a step. A kick crosses one sample at most.
-  HWY_INLINE V mean_command(std::size_t sample, double fraction) {
-    const double half = 0.5 * step_s_ / log_.sample_period_s;
-    const V cell = cell_;
-    const V rest = hn::NegMulAdd(constant(-0.5), hn::Add(left_, right_), hn::Neg(integral_));
-    const V begun = integral_;
-    move_to(commanded_place(static_cast<double>(sample) + fraction + half));
-    const V passed =
-        hn::IfThenElse(hn::Eq(cell, cell_), hn::Sub(integral_, begun), hn::Add(rest, integral_));
-    return hn::Mul(passed, constant(log_.sample_period_s / kick_s_));
+    const double end = now + 0.5 * step_s_ / log_.sample_period_s;
+    return hn::Mul(command_.integral_to(end), constant(log_.sample_period_s / kick_s_));
   }
 
   HWY_INLINE V law_torque(V goal) {
@@ -241,34 +198,10 @@ class Rollout {
     V wanted = hn::Mul(constant(log_.gain), hn::Sub(goal, angle_));
     wanted = hn::NegMulAdd(constant(log_.speed_gain), filtered_speed_, wanted);
     const V limited = within(wanted, constant(log_.limit));
-    if (has_delay_) return delayed(limited);
+    if (has_delay_) return ring_.delayed(limited);
     if (log_.speed_filter_rad_s <= 0.0)
       motor_damping_ = hn::IfThenElseZero(hn::Eq(limited, wanted), constant(log_.speed_gain));
     return limited;
-  }
-
-  // `wanted` as it was one delay ago, interpolated in the ring of past values.
-  HWY_INLINE V delayed(V wanted) {
-    const std::size_t width = hn::MaxLanes(D());
-    if (newest_ == 0)
-      for (std::size_t k = 0; k <= ring_mask_; ++k)
-        hn::Store(wanted, D(), ring_.data() + k * width);
-    hn::Store(wanted, D(), ring_.data() + (newest_ & ring_mask_) * width);
-    const V age = hn::Mul(of_(DriveParameter::delay), constant(1.0 / step_s_));
-    const V steps = hn::Min(hn::Max(age, hn::Zero(D())), constant(max_steps_));
-    const V whole = hn::Floor(steps);
-    const V newest = constant(static_cast<double>(newest_ + ring_mask_ + 1));
-    const auto slot = [&](V past) HWY_ATTR {
-      const Index tag;
-      const auto ring = hn::And(hn::ConvertTo(tag, hn::Sub(newest, past)),
-                                hn::Set(tag, static_cast<std::int64_t>(ring_mask_)));
-      return hn::Add(hn::Mul(ring, hn::Set(tag, static_cast<std::int64_t>(width))),
-                     hn::Iota(tag, 0));
-    };
-    const V recent = hn::GatherIndex(D(), ring_.data(), slot(whole));
-    const V older = hn::GatherIndex(D(), ring_.data(), slot(hn::Add(whole, constant(1.0))));
-    ++newest_;
-    return hn::MulAdd(hn::Sub(steps, whole), hn::Sub(older, recent), recent);
   }
 
   HWY_INLINE V winding_torque(V duty) {
@@ -306,21 +239,24 @@ class Rollout {
     return limited;
   }
 
-  HWY_INLINE V motor_torque(std::size_t sample, double fraction) {
+  // The torque that acts in the share of the kick with power.
+  HWY_INLINE V switched(V torque) {
+    motor_damping_ = hn::Mul(constant(power_), motor_damping_);
+    return hn::Mul(constant(power_), torque);
+  }
+
+  HWY_INLINE V motor_torque(double now) {
     motor_damping_ = hn::Zero(D());
-    const V input = is_second_order_ ? mean_command(sample, fraction) : command(sample, fraction);
+    const V input = command(now);
     switch (log_.kind) {
       case CommandKind::goal_to_duty:
         return winding_torque(
             within(hn::Mul(constant(log_.gain), hn::Sub(input, angle_)), constant(log_.limit)));
       case CommandKind::duty: return winding_torque(input);
-      case CommandKind::goal_to_torque: {
-        const V torque = law_torque(input);
-        return hn::Mul(constant(power_), within_supply(torque));
-      }
+      case CommandKind::goal_to_torque: return switched(within_supply(law_torque(input)));
       case CommandKind::current:
-        return hn::Mul(constant(power_), hn::Mul(of_(DriveParameter::torque_constant), input));
-      case CommandKind::torque: return hn::Mul(constant(power_), within_supply(input));
+        return switched(hn::Mul(of_(DriveParameter::torque_constant), input));
+      case CommandKind::torque: return switched(within_supply(input));
     }
     return hn::Zero(D());
   }
@@ -366,17 +302,13 @@ class Rollout {
     return hn::MulAdd(constant(kick_s_), hn::Div(torque, inertia), speed);
   }
 
-  // The damping of a winding has its power already; that of a law does not act without power.
-  HWY_INLINE double power_damping() const { return has_winding(log_.kind) ? 1.0 : power_; }
-
   HWY_INLINE V motor_inertia() const {
-    const V viscous = of_(DriveParameter::viscous);
-    return effective_inertia(inertia_,
-                             hn::MulAdd(constant(power_damping()), motor_damping_, viscous));
+    return effective_inertia(inertia_, hn::Add(motor_damping_, of_(DriveParameter::viscous)));
   }
 
-  HWY_INLINE void step(std::size_t sample, double fraction) {
-    const V motor = motor_torque(sample, fraction);
+  // `now`: time in samples.
+  HWY_INLINE void step(double now) {
+    const V motor = motor_torque(now);
     const V dt = constant(step_s_);
     if (has_spring_) return step_two(motor, dt);
     const V gravity = hn::Neg(hn::Mul(gravity_, sine(hn::Add(angle_, zero_))));
@@ -434,16 +366,18 @@ class Rollout {
   const DriveRun& run_;
   Constants of_;
   std::size_t at_;
-  const double* command_end_;
-  bool has_delay_, has_load_, has_load_stribeck_, has_stribeck_, has_rise_, has_exponent_,
-      has_speed_limit_, has_spring_;
-  bool has_hysteresis_, has_backlash_, has_presliding_, is_law_delayed_;
+  bool has_delay_;
   bool is_second_order_;
   double implicit_share_;  ///< share of the damping that acts at the new speed
-  double power_ = 1.0;     ///< share of the kick in which the power is on
-  std::size_t substeps_ = 1;
-  double step_s_ = 0.0;
-  double kick_s_ = 0.0;  ///< time for which torques act on the speeds: half a step at first
+  std::size_t substeps_;
+  double step_s_;
+  double kick_s_;       ///< time for which torques act on the speeds: half a step at first
+  double power_ = 1.0;  ///< share of the kick in which the power is on
+  LaneCommand command_;
+  DelayRing ring_;
+  bool has_load_, has_load_stribeck_, has_stribeck_, has_rise_, has_exponent_, has_speed_limit_,
+      has_spring_;
+  bool has_hysteresis_, has_backlash_, has_presliding_;
   V gravity_, zero_, inertia_, joint_inertia_;
   V inverse_load_speed_ = hn::Zero(D()), inverse_stribeck_speed_ = hn::Zero(D());
   V speed_slope_ = hn::Zero(D());
@@ -452,11 +386,6 @@ class Rollout {
   V angle_, speed_, filtered_speed_, joint_angle_, joint_speed_;
   V bristle_ = hn::Zero(D()), stop_ = hn::Zero(D()), joint_torque_ = hn::Zero(D());
   V motor_damping_ = hn::Zero(D());
-  V cell_ = hn::Zero(D()), left_ = hn::Zero(D()), right_ = hn::Zero(D()), integral_ = hn::Zero(D());
-  double max_steps_ = 0.0;  ///< length of the delay
-  std::size_t newest_ = 0;
-  std::size_t ring_mask_ = 0;
-  detail::AlignedVector<double> ring_;
 };
 
 void roll_out_lanes(const DriveLog& log, const DriveRun& run, const DriveLanes& parameters,

@@ -9,6 +9,7 @@
 #include "identify/drive/drive_findings.hpp"
 #include "identify/drive/drive_logs.hpp"
 #include "joint_load/load_fact.hpp"
+#include "numerics/jackknife.hpp"
 #include "numerics/quantile.hpp"
 #include "torsio/core/error.hpp"
 
@@ -118,12 +119,7 @@ double standard_error(const std::vector<ErrorGainSums>& parts) {
     if (all.square > part.square)
       gains.push_back((all.product - part.product) / (all.square - part.square));
   if (gains.size() < 2) return kNotMeasured;
-  const auto count = static_cast<double>(gains.size());
-  double mean = 0.0;
-  for (const double gain : gains) mean += gain / count;
-  double square = 0.0;
-  for (const double gain : gains) square += (gain - mean) * (gain - mean);
-  return std::sqrt((count - 1.0) / count * square);
+  return std::sqrt(jackknife_variance(gains));
 }
 
 double gain_of(const ErrorGainSums& sums) {

@@ -10,13 +10,11 @@
 #include <string>
 #include <utility>
 
-#include "core/aligned_vector.hpp"
 #include "identify/drive/drive_checks.hpp"
 #include "identify/drive/drive_course.hpp"
 #include "identify/drive/drive_findings.hpp"
-#include "identify/drive/drive_fit.hpp"
 #include "identify/drive/drive_logs.hpp"
-#include "identify/drive/drive_rollout.hpp"
+#include "identify/drive/free_run.hpp"
 
 namespace torsio {
 namespace {
@@ -61,18 +59,8 @@ struct MissedPeak {
   double modelled = 0.0;
 };
 
-std::vector<double> angles_of_free_run(const DriveLog& log, const DriveIdentification& identified) {
-  const DriveLanes lanes = DriveLanes::all(identified.values);
-  detail::AlignedVector<double> lane_angles(log.size() * kDriveLanes);
-  roll_out(log, run_from(log, 0, log.size()), lanes, {identified.terms, identified.step_s},
-           {.angle_rad = lane_angles.data()});
-  std::vector<double> angles_rad(log.size());
-  for (std::size_t n = 0; n < log.size(); ++n) angles_rad[n] = lane_angles[n * kDriveLanes];
-  return angles_rad;
-}
-
 void find_peak(const DriveLog& log, const DriveIdentification& identified, MissedPeak& worst) {
-  const std::vector<double> angles = angles_of_free_run(log, identified);
+  const std::vector<double> angles = free_run(log, identified).angle_rad;
   constexpr int kFrequencies = 40;
   std::array<double, kFrequencies> command{};
   const auto phase = [&](int k) {
@@ -152,8 +140,7 @@ std::string shown_by_peak(const std::vector<DriveLog>& logs,
   if (!follows_goal(logs.front().kind)) return {};
   MissedPeak worst;
   for (const DriveLog& log : logs)
-    if (std::ranges::all_of(log.enabled, [](double on) { return on != 0.0; }))
-      find_peak(log, identified, worst);
+    if (is_always_powered(log)) find_peak(log, identified, worst);
   constexpr double kMissed = 0.25;
   if (worst.measured - worst.modelled <= kMissed * worst.measured || worst.measured == 0.0)
     return {};
@@ -186,7 +173,7 @@ bool is_error_oscillating(const std::vector<DriveLog>& logs,
   std::size_t of_errors = 0;
   std::size_t of_motions = 0;
   for (const DriveLog& log : logs) {
-    std::vector<double> error = angles_of_free_run(log, identified);
+    std::vector<double> error = free_run(log, identified).angle_rad;
     for (std::size_t n = 0; n < error.size(); ++n) error[n] -= log.angle_rad[n];
     of_errors += crossings(without_mean(std::move(error)));
     of_motions += crossings(without_mean(log.angle_rad));

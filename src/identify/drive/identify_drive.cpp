@@ -7,7 +7,6 @@
 #include <iterator>
 #include <utility>
 
-#include "core/aligned_vector.hpp"
 #include "core/report_progress.hpp"
 #include "identify/drive/choose_structure.hpp"
 #include "identify/drive/drive_checks.hpp"
@@ -15,6 +14,7 @@
 #include "identify/drive/drive_fit.hpp"
 #include "identify/drive/drive_logs.hpp"
 #include "identify/drive/error_gain.hpp"
+#include "identify/drive/free_run.hpp"
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
 
@@ -186,19 +186,12 @@ DriveIdentification identify_drive(const std::vector<Recording>& recordings, con
 
 DriveTrace simulate_drive(const DriveIdentification& identified, const Recording& recording) {
   const DriveLog log = drive_log(recording, identified.load, identified.drive);
-  DriveLanes lanes = DriveLanes::all(identified.values);
-  detail::AlignedVector<double> angle(log.size() * kDriveLanes);
-  detail::AlignedVector<double> joint(log.size() * kDriveLanes);
-  detail::AlignedVector<double> torque(log.size() * kDriveLanes);
-  roll_out(log, run_from(log, 0, log.size()), lanes, {identified.terms, identified.step_s},
-           {angle.data(), joint.data(), torque.data()});
-  DriveTrace trace{.sample_rate_Hz = recording.sample_rate_Hz(), .measured_rad = log.angle_rad};
-  for (std::size_t n = 0; n < log.size(); ++n) {
-    trace.angle_rad.push_back(angle[n * kDriveLanes]);
-    trace.joint_angle_rad.push_back(joint[n * kDriveLanes]);
-    trace.joint_torque_Nm.push_back(torque[n * kDriveLanes]);
-  }
-  return trace;
+  FreeRun run = free_run(log, identified);
+  return {.sample_rate_Hz = recording.sample_rate_Hz(),
+          .measured_rad = log.angle_rad,
+          .angle_rad = std::move(run.angle_rad),
+          .joint_angle_rad = std::move(run.joint_angle_rad),
+          .joint_torque_Nm = std::move(run.joint_torque_Nm)};
 }
 
 }  // namespace torsio

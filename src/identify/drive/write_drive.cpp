@@ -48,9 +48,7 @@ DriveValues typical_bam() {
 }
 
 bool has_passive_run(const std::vector<DriveLog>& logs) {
-  return std::ranges::any_of(logs, [](const DriveLog& log) {
-    return std::ranges::find(log.enabled, 0.0) != log.enabled.end();
-  });
+  return !std::ranges::all_of(logs, is_always_powered);
 }
 
 void require_identifier(const std::string& name) {
@@ -100,20 +98,6 @@ std::vector<std::string> other_terms(const DriveTerms& terms, const DriveTerms& 
 
 std::string joined_terms(const std::vector<std::string>& names) {
   return names.empty() ? "nothing" : joined(names);
-}
-
-/// What a friction model of BAM has. m1 has neither the Stribeck effect nor load, m2 no load, m3 no Stribeck effect.
-DriveTerms terms_of_bam(BamModel model) {
-  using enum DriveTerm;
-  switch (model) {
-    case BamModel::m1: return drive_terms({base});
-    case BamModel::m2: return drive_terms({base, stribeck});
-    case BamModel::m3: return drive_terms({base, load_friction});
-    case BamModel::m4: return drive_terms({base, stribeck, load_friction, load_stribeck});
-    case BamModel::m5:
-    case BamModel::m6: break;
-  }
-  return drive_terms({base, stribeck, load_friction, load_stribeck, direction});
 }
 
 WrittenDrive write_bam(const DriveIdentification& identified, const std::vector<DriveLog>& logs,
