@@ -65,22 +65,6 @@ DesignSection sensitivity_section(const RubberRing& ring, const RubberSpringDema
                         demand.hardness_tolerance, demand.dimension_tolerance_m * 1e3)}}};
 }
 
-DesignSection comparison_section(const RubberRing& ring, double torque_Nm) {
-  DesignSection section{"table_1_of_002"};
-  const auto add = [&](std::string_view name, std::string_view principle, double ratio,
-                       const std::string& remark) {
-    section.figures.push_back(
-        {std::string(name), ratio, "cm^3/Nm", fmt::format("{}{}", principle, remark)});
-  };
-  for (const PublishedTorqueSensor& sensor : torque_sensors_002())
-    add(sensor.name, sensor.principle, sensor.volume_cm3 / sensor.torque_Nm,
-        std::isfinite(sensor.ratio_cm3_Nm) ? fmt::format(", printed {}", sensor.ratio_cm3_Nm)
-                                           : ", size or torque not printed");
-  add("this design", "rubber", sensor_volume_cm3(ring) / torque_Nm,
-      ", housing exceeds the ring as that of 002 does (assumed)");
-  return section;
-}
-
 XyFigure outline_figure(const RubberRing& ring) {
   const double length = ring.length_m * 1e3;
   const double outer = ring.outer_m * 1e3;
@@ -167,7 +151,6 @@ DesignReport rubber_spring_report(const RubberSpringDemand& demand) {
     active.figures.push_back({each.name, each.multiplier, "", "objective per " + each.unit});
   report.sections.push_back(std::move(active));
   report.sections.push_back(sensitivity_section(design.rounded, demand));
-  report.sections.push_back(comparison_section(design.rounded, demand.torque_Nm));
   const RubberRing& ring = design.rounded;
   report.pictures = {outline_figure(ring), torque_figure(ring, demand), search_figure(design)};
   if (report.at("rounded", "shear_strain").value > 1.0)

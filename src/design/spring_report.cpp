@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <variant>
 
 #include "torsio/core/error.hpp"
@@ -35,19 +36,40 @@ XyFigure torque_figure(const SpringDemand& d, const SpringDesign& design) {
           .series = {spring, demand}};
 }
 
+double resonance_Hz(const SpringDemand& d, const SpringDesign& design) {
+  return std::sqrt(design.stiffness_Nm_rad / d.load_inertia_kg_m2) / (2.0 * std::numbers::pi);
+}
+
+DesignTable kinds_table(const SpringDemand& d, const SpringDesign& design,
+                        std::span<const SpringDesign> kinds) {
+  DesignTable table{.name = "kinds", .row_name = "kind"};
+  for (const SpringDesign& each : kinds) {
+    DesignAlternative row{.name = std::string(name_of(each.kind)),
+                          .is_chosen = design.is_feasible && each.kind == design.kind,
+                          .infeasible = each.infeasible};
+    if (each.is_feasible)
+      row.figures = {
+          {"mass", each.mass_kg * 1e3, "g"},         {"diameter", each.envelope_m * 1e3, "mm"},
+          {"length", each.length_m * 1e3, "mm"},     {"stress", each.stress_Pa * 1e-6, "MPa"},
+          {"fatigue_margin", each.fatigue_margin},   {"friction", 100.0 * each.friction_share, "%"},
+          {"resonance", resonance_Hz(d, each), "Hz"}};
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
 }  // namespace
 
 void note_fatigue(DesignReport& report, const SpringDemand& d, const SpringDesign& design) {
-  const auto margin =
-      std::ranges::find(design.dimensions.figures, "fatigue_margin", &DesignFigure::name);
-  if (margin == design.dimensions.figures.end() || !(margin->value < 1.0)) return;
+  if (!(design.fatigue_margin < 1.0)) return;
   report.notes.push_back(
       fmt::format("The spring does not last under this torque in both directions: --safety {:.2g} "
                   "makes it last.",
-                  std::ceil(10.0 * d.safety / margin->value) / 10.0));
+                  std::ceil(10.0 * d.safety / design.fatigue_margin) / 10.0));
 }
 
-DesignReport spring_report(const SpringDemand& d, const SpringDesign& design) {
+DesignReport spring_report(const SpringDemand& d, const SpringDesign& design,
+                           std::span<const SpringDesign> kinds) {
   DesignReport report{
       .design = "spring", .is_feasible = design.is_feasible, .infeasible = design.infeasible};
   report.sections.push_back(
@@ -60,6 +82,7 @@ DesignReport spring_report(const SpringDemand& d, const SpringDesign& design) {
         {"bore", d.bore_m * 1e3, "mm"},
         {"material", kNotMeasured, "", d.material.source, d.material.name},
         {"allowed_shear", d.material.allowed_shear_Pa / d.safety * 1e-6, "MPa"}}});
+  if (!kinds.empty()) report.tables.push_back(kinds_table(d, design, kinds));
   if (!design.is_feasible) return report;
   DesignSection section = design.dimensions;
   section.figures.insert(section.figures.begin(), DesignFigure{"kind", kNotMeasured, "", "",
@@ -74,9 +97,9 @@ DesignReport spring_report(const SpringDemand& d, const SpringDesign& design) {
         {"mass", design.mass_kg * 1e3, "g", "of the spring without its ends"},
         {"torque_resolution", k * lsb_rad, "Nm",
          fmt::format("one step of an encoder of {:g} bits", d.encoder_bits)},
-        {"resonance", std::sqrt(k / d.load_inertia_kg_m2) / (2.0 * std::numbers::pi), "Hz",
+        {"resonance", resonance_Hz(d, design), "Hz",
          fmt::format("with a load of {:g} kg m2, rotor held", d.load_inertia_kg_m2)}}});
-  report.pictures.push_back(torque_figure(d, design));
+  report.pictures.emplace_back(torque_figure(d, design));
   note_fatigue(report, d, design);
   const bool is_rod = design.kind == SpringKind::rod || design.kind == SpringKind::tube;
   if (is_rod && design.length_m < 2.0 * design.outer_m)

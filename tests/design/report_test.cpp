@@ -20,6 +20,10 @@ TEST(DesignReport, HasTheSameKeysAndValuesInYamlAndJson) {
                                           {{"length", 57.25, "mm", "a # remark"},
                                            {"steel", kNotMeasured, "", "", "50CrV4"},
                                            {"bore", kNotMeasured, "mm"}}}},
+                            .tables = {{"kinds",
+                                        "kind",
+                                        {{"rod", true, "", {{"mass", 12.5, "g"}}},
+                                         {"coils", false, "coils: no room", {}}}}},
                             .notes = {"a note"}};
   const auto json = nlohmann::json::parse(design_json(report));
   const YAML::Node yaml = YAML::Load(design_yaml(report));
@@ -30,6 +34,18 @@ TEST(DesignReport, HasTheSameKeysAndValuesInYamlAndJson) {
   EXPECT_EQ(yaml["ring"]["steel"].as<std::string>(), "50CrV4");
   EXPECT_TRUE(json.at("ring").at("bore_mm").is_null());
   EXPECT_TRUE(yaml["ring"]["bore_mm"].IsNull());
+  EXPECT_EQ(json.at("kinds").at(0).at("kind"), "rod");
+  EXPECT_EQ(json.at("kinds").at(0).at("chosen"), true);
+  EXPECT_EQ(json.at("kinds").at(0).at("mass_g"), 12.5);
+  EXPECT_TRUE(json.at("kinds").at(0).at("infeasible").is_null());
+  EXPECT_EQ(json.at("kinds").at(1).at("infeasible"), "coils: no room");
+  EXPECT_EQ(yaml["kinds"][0]["mass_g"].as<double>(), 12.5);
+  EXPECT_EQ(yaml["kinds"][1]["infeasible"].as<std::string>(), "coils: no room");
+  EXPECT_FALSE(yaml["kinds"][1]["feasible"].as<bool>());
+  EXPECT_EQ(design_page(report).sections.front().tables.front().rows.size(), 2U);
+  const std::string text = design_text(report);
+  EXPECT_NE(text.find("rod    chosen"), std::string::npos) << text;
+  EXPECT_NE(text.find("coils: no room"), std::string::npos) << text;
 }
 
 TEST(DesignQuantity, IsRefusedWithoutItsUnit) {

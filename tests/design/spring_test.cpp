@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "design/preferred_sizes.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
@@ -48,8 +50,10 @@ TEST(DesignedSpring, RodOf120NmHasTheDimensionsOfTheFormula) {
   const SpringDesign rod = design_spring(demand_120(), SpringKind::rod);
   ASSERT_TRUE(rod.is_feasible);
   EXPECT_NEAR(rod.outer_m, 9.6e-3, 1e-9) << "9.56 mm on the grid";
-  EXPECT_NEAR(rod.stiffness_Nm_rad, deg_from_rad(19.8), 0.01);
-  EXPECT_NEAR(rod.length_m, 0.0583, 1e-4);
+  EXPECT_NEAR(rod.length_m, 0.0583, 1e-9);
+  // The stiffness is that of the rounded length.
+  EXPECT_NEAR(rod.stiffness_Nm_rad, rod_stiffness(0.0096, 0.0, 0.0583, 79.3e9), 1e-6);
+  EXPECT_NEAR(rod.stiffness_Nm_rad / deg_from_rad(19.8), 1.0, 1e-3);
 }
 
 TEST(DesignedSpring, TubeHasTheBoreAndDoesNotBuckle) {
@@ -57,15 +61,82 @@ TEST(DesignedSpring, TubeHasTheBoreAndDoesNotBuckle) {
   demand.bore_m = 0.010;
   const SpringDesign tube = design_spring(demand, SpringKind::tube);
   ASSERT_TRUE(tube.is_feasible);
-  EXPECT_GE(tube.inner_m, 0.010);
+  EXPECT_GE(tube.inner_m, 0.010 - 1e-9);
   EXPECT_NEAR(tube.outer_m, 0.012, 2e-4);
-  EXPECT_NEAR(tube.stiffness_Nm_rad / deg_from_rad(19.8), 1.0, 1e-6);
+  EXPECT_NEAR(std::remainder(tube.inner_m, 0.1e-3), 0.0, 1e-9) << "a drill";
+  EXPECT_NEAR(tube.stiffness_Nm_rad,
+              rod_stiffness(tube.outer_m, tube.inner_m, tube.length_m, 79.3e9), 1e-6);
+  EXPECT_NEAR(tube.stiffness_Nm_rad / deg_from_rad(19.8), 1.0, 1e-3);
   EXPECT_LE(rod_stress(tube.outer_m, tube.inner_m, 120.0), 700e6 * (1.0 + 1e-9));
   demand.bore_m = 0.017;  // the wall of 18 mm buckles
   const SpringDesign wide = design_spring(demand, SpringKind::tube);
   EXPECT_FALSE(wide.is_feasible);
   EXPECT_NE(wide.infeasible.find("the bore of 17 mm would have to move to 1"), std::string::npos)
       << wide.infeasible;
+}
+
+TEST(DesignedSpring, BucklingStressIsPrintedForThinWallsAlone) {
+  SpringDemand demand = demand_120();
+  const auto buckling = [&] {
+    return spring_report(demand, design_spring(demand, SpringKind::tube))
+        .at("spring", "buckling_stress");
+  };
+  EXPECT_TRUE(std::isnan(buckling().value)) << "thick wall: " << buckling().value;
+  EXPECT_NE(buckling().remark.find("yields first"), std::string::npos) << buckling().remark;
+  demand.bore_m = 0.0145;
+  demand.safety = 1.0;
+  demand.largest_length_m = 0.2;
+  const DesignReport thin = spring_report(demand, design_spring(demand, SpringKind::tube));
+  EXPECT_GE(thin.at("spring", "buckling_stress").value,
+            2.0 * thin.at("spring", "shear_stress").value);
+}
+
+TEST(DesignedSpring, KindsAreComparedInATable) {
+  SpringDemand demand = demand_120();
+  demand.largest_diameter_m = 0.2;
+  const auto kinds = design_springs(demand);
+  ASSERT_EQ(kinds.size(), 4U);
+  const SpringDesign lightest = lightest_spring(kinds);
+  EXPECT_EQ(lightest.kind, design_lightest_spring(demand).kind);
+  const DesignReport report = spring_report(demand, lightest, kinds);
+  ASSERT_EQ(report.tables.size(), 1U);
+  int chosen = 0;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const DesignAlternative& row = report.tables[0].rows.at(i);
+    EXPECT_EQ(row.name, name_of(kinds[i].kind));
+    EXPECT_EQ(row.infeasible.empty(), kinds[i].is_feasible);
+    chosen += row.is_chosen ? 1 : 0;
+    if (!kinds[i].is_feasible) continue;
+    EXPECT_GE(row.figures.at(0).value, 1e3 * lightest.mass_kg);
+    EXPECT_LE(kinds[i].envelope_m, demand.largest_diameter_m);
+    EXPECT_NEAR(row.figures.at(0).value, 1e3 * kinds[i].mass_kg, 1e-9);
+  }
+  EXPECT_EQ(chosen, 1);
+  demand.largest_diameter_m = 0.08;
+  const auto narrow = design_springs(demand);
+  EXPECT_NE(narrow[2].infeasible.find(
+                "coils: infeasible: the largest diameter of 80 mm would have to move to "),
+            std::string::npos)
+      << narrow[2].infeasible;
+}
+
+TEST(PreferredSizes, WiresAreThoseOfR20AndBoresThoseOfDrills) {
+  const auto wires = preferred_wires_mm();
+  EXPECT_TRUE(std::ranges::is_sorted(wires));
+  // A series R20 rises by 12.2 %; the rounding of R'20 moves each by 2 % at most.
+  for (std::size_t i = 1; i < wires.size(); ++i)
+    EXPECT_NEAR(wires[i] / wires[i - 1], std::pow(10.0, 1.0 / 20.0), 0.03) << wires[i];
+  for (const auto& [wanted_mm, drill_mm] : {std::pair{2.69192, 2.6},
+                                            {2.7, 2.7},
+                                            {14.3, 14.25},
+                                            {31.99, 31.75},
+                                            {33.7, 33.5},
+                                            {60.9, 60.0},
+                                            {0.05, 0.0}})
+    EXPECT_NEAR(drill_at_most_m(1e-3 * wanted_mm), 1e-3 * drill_mm, 1e-9) << wanted_mm;
+  EXPECT_NEAR(drill_below_m(0.0027), 0.0026, 1e-9);
+  EXPECT_NEAR(drill_below_m(0.014), 0.0139, 1e-9);
+  EXPECT_NEAR(drill_below_m(0.01425), 0.014, 1e-9);
 }
 
 TEST(DesignedSpring, NamesTheLengthThatTheRodWouldNeed) {
@@ -144,6 +215,7 @@ TEST(DesignedSpring, CoilsStayPreloadedWithinTheirStress) {
   const auto value = [&](const char* name) { return report.at("spring", name).value; };
   EXPECT_GT(value("preload_travel"), value("travel"));
   EXPECT_LE(value("shear_stress"), 700.0);
+  EXPECT_TRUE(std::ranges::count(preferred_wires_mm(), value("wire_diameter")) == 1);
   const double radius = value("radius") * 1e-3;
   EXPECT_NEAR(value("springs") * value("rate") * 1e3 * radius * radius *
                   std::sin(demand.angle_rad) * std::cos(demand.angle_rad),
@@ -152,11 +224,12 @@ TEST(DesignedSpring, CoilsStayPreloadedWithinTheirStress) {
 
 TEST(DesignedSpring, ReportsResolutionAndResonance) {
   const SpringDemand demand = demand_120();
-  const DesignReport report = spring_report(demand, design_spring(demand, SpringKind::rod));
+  const SpringDesign rod = design_spring(demand, SpringKind::rod);
+  const DesignReport report = spring_report(demand, rod);
   EXPECT_NEAR(report.at("joint", "torque_resolution").value,
-              deg_from_rad(19.8) * 2.0 * 3.14159265 / 524288.0, 1e-6);
+              rod.stiffness_Nm_rad * 2.0 * 3.14159265 / 524288.0, 1e-6);
   EXPECT_NEAR(report.at("joint", "resonance").value,
-              std::sqrt(deg_from_rad(19.8) / 0.15) / (2.0 * 3.14159265), 1e-2);
+              std::sqrt(rod.stiffness_Nm_rad / 0.15) / (2.0 * 3.14159265), 1e-6);
 }
 
 TEST(DesignedSpring, RefusesWhatCannotBe) {

@@ -40,10 +40,49 @@ TEST_F(DesignVerb, SizesASpringThatSimulateMeasures) {
   EXPECT_EQ(torsio("simulate joint.yaml static-cycle --duration 20s -o a.csv").exit_code, 0);
 }
 
+TEST_F(DesignVerb, ComparesTheKindsOfSprings) {
+  const Outcome table = torsio(
+      "design spring --torque 30Nm --angle 6deg --max-diameter 80mm --max-length 200mm "
+      "--load-inertia 0.15kgm2 --json a.json --report a.html");
+  ASSERT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_EQ(table.out.find("35574"), std::string::npos) << "buckling stress of a thick wall";
+  const auto json = nlohmann::json::parse(contents("a.json"));
+  ASSERT_EQ(json.at("kinds").size(), 4U);
+  for (const auto& kind : json.at("kinds")) {
+    EXPECT_NE(table.out.find(kind.at("kind").get<std::string>()), std::string::npos);
+    if (kind.at("chosen")) EXPECT_EQ(kind.at("kind"), json.at("spring").at("kind"));
+  }
+  EXPECT_NE(contents("a.html").find("Alternatives"), std::string::npos);
+}
+
+TEST_F(DesignVerb, NamesAllOptionsThatAreMissing) {
+  for (const auto& [call, missing] :
+       {std::pair{"spring", "--torque, --angle or --stiffness, --max-diameter, --max-length"},
+        {"spring --torque 3Nm --angle 3deg", "--max-diameter, --max-length"},
+        {"rubber-spring", "--torque, --angle or --stiffness"},
+        {"clutch", "--slip or --torque"},
+        {"actuator --peak 80Nm", "--continuous, --speed, --deflection"},
+        {"coupling", "--angle, --measured-torque or --shear-modulus"},
+        {"coupling --search 3", "--shear-modulus"}})
+    expect_error(torsio(std::string("design ") + call), kCallWasWrong,
+                 std::string("expected ") + missing + ", found a call without");
+}
+
+TEST_F(DesignVerb, RefusesAQuantityWithoutItsUnit) {
+  const std::string spring =
+      "design spring --torque 30Nm --angle 6deg --max-diameter 80mm --max-length 200mm ";
+  expect_error(torsio(spring + "--load-inertia 0.15"), kCallWasWrong, "--load-inertia");
+  expect_error(torsio("design actuator --continuous 45Nm --peak 90Nm --speed 60deg/s --deflection "
+                      "5deg --link-inertia 0.3"),
+               kCallWasWrong, "--link-inertia");
+  expect_error(torsio("design coupling --angle 6deg --shear-modulus 4MPa --time-limit 100"),
+               kCallWasWrong, "--time-limit");
+}
+
 TEST_F(DesignVerb, ChoosesAnActuatorThatTheOtherVerbsDrive) {
   const Outcome table = torsio(
       "design actuator --continuous 45Nm --peak 90Nm --speed 60deg/s --deflection 5deg "
-      "--link-inertia 0.3 --sheet joint.yaml --plot pareto.svg");
+      "--link-inertia 0.3kgm2 --sheet joint.yaml --plot pareto.svg");
   ASSERT_EQ(table.exit_code, 0) << table.err;
   EXPECT_NE(contents("pareto.svg").find("Pareto front"), std::string::npos);
   EXPECT_EQ(torsio("tune-loop --actuator joint.yaml --bandwidth 8Hz").exit_code, 0);
@@ -68,7 +107,8 @@ TEST_F(DesignVerb, WritesNothingButTheAnswerWhereItIsInfeasible) {
 TEST_F(DesignVerb, RefusesACallBeforeAnyFileIsWritten) {
   const std::string rubber = "design rubber-spring --json a.json --torque ";
   expect_error(torsio(rubber + "0.5 --angle 15deg"), kCallWasWrong, "a number with its unit");
-  expect_error(torsio(rubber + "0.5Nm"), kCallWasWrong, "--angle, --stiffness: expected one");
+  expect_error(torsio(rubber + "0.5Nm"), kCallWasWrong,
+               "design rubber-spring: expected --angle or --stiffness, found a call without it");
   expect_error(torsio(rubber + "0.5Nm --angle 15mm"), kCallWasWrong, "--angle");
   expect_error(torsio(rubber + "0.5Nm --angle 15deg --hardness 94"), kCallWasWrong,
                "30 to 80 Shore A");

@@ -19,26 +19,22 @@ struct RubberFlags {
   DesignOutputs outputs;
 };
 
-/// Exactly one of two flags must be given.
-void one_of(const std::string& first, const std::string& second, const char* flags) {
-  if (first.empty() == second.empty())
-    throw torsio::UsageError(
-        {.place = flags, .expected = "one of the two", .found = first.empty() ? "none" : "both"});
-}
-
 void run(const RubberFlags& flags) {
   flags.outputs.check();
+  require_options("design rubber-spring",
+                  {{"--torque", &flags.torque, "0.5Nm"},
+                   {"--angle", &flags.angle, "15deg", "--stiffness", &flags.stiffness}});
   torsio::RubberSpringDemand demand = flags.demand;
   demand.torque_Nm = needed(flags.torque, "Nm", "--torque");
-  one_of(flags.angle, flags.stiffness, "--angle, --stiffness");
   demand.angle_rad = flags.angle.empty()
                          ? demand.torque_Nm / needed(flags.stiffness, "Nm_rad", "--stiffness")
                          : needed(flags.angle, "rad", "--angle");
   demand.shear_modulus_Pa = flags.modulus.empty()
                                 ? torsio::shear_modulus_of_hardness(flags.hardness)
                                 : needed(flags.modulus, "Pa", "--shear-modulus");
-  if (!flags.strain.empty() && !flags.stress.empty())
-    one_of(flags.strain, flags.stress, "--stress, --strain");
+  if (!flags.strain.empty())
+    require_options("design rubber-spring",
+                    {{"--strain", &flags.strain, "70pct", "--stress", &flags.stress}});
   demand.allowed_stress_Pa = quantity(flags.stress, "Pa", "--stress", demand.allowed_stress_Pa);
   if (!flags.strain.empty())
     demand.allowed_stress_Pa =
@@ -110,8 +106,8 @@ struct ClutchFlags {
 
 void run(const ClutchFlags& flags) {
   flags.outputs.check();
+  require_options("design clutch", {{"--slip", &flags.slip, "0.5Nm", "--torque", &flags.torque}});
   torsio::ClutchDemand demand = flags.demand;
-  one_of(flags.slip, flags.torque, "--slip, --torque");
   demand.slip_Nm = flags.slip.empty() ? flags.margin * needed(flags.torque, "Nm", "--torque")
                                       : needed(flags.slip, "Nm", "--slip");
   demand.outer_m = quantity(flags.outer, "m", "--outer-radius", demand.outer_m);

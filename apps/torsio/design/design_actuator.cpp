@@ -12,13 +12,17 @@ namespace {
 struct ActuatorFlags {
   torsio::ActuatorDemand demand;
   std::string continuous, peak, speed, deflection, bandwidth = "8Hz", impedance, softest;
-  std::string collision, reach;
+  std::string collision, reach, link_inertia = "0.15kgm2";
   std::string diameter = "100mm", length = "120mm", bore, resolution;
   std::string drives, materials, washers, material = "50CrV4", sheet;
   DesignOutputs outputs;
 };
 
 torsio::ActuatorDemand demand_of(const ActuatorFlags& flags) {
+  require_options("design actuator", {{"--continuous", &flags.continuous, "40Nm"},
+                                      {"--peak", &flags.peak, "80Nm"},
+                                      {"--speed", &flags.speed, "60deg/s"},
+                                      {"--deflection", &flags.deflection, "5deg"}});
   torsio::ActuatorDemand demand = flags.demand;
   demand.continuous_Nm = needed(flags.continuous, "Nm", "--continuous");
   demand.peak_Nm = needed(flags.peak, "Nm", "--peak");
@@ -29,6 +33,7 @@ torsio::ActuatorDemand demand_of(const ActuatorFlags& flags) {
   demand.softest_Nm_rad =
       quantity(flags.softest, "Nm_rad", "--softest-impedance", demand.softest_Nm_rad);
   demand.collision_N = quantity(flags.collision, "N", "--collision", demand.collision_N);
+  demand.link_inertia_kg_m2 = needed(flags.link_inertia, "kg_m2", "--link-inertia");
   demand.reach_m = quantity(flags.reach, "m", "--reach", demand.reach_m);
   demand.torque_resolution_Nm =
       quantity(flags.resolution, "Nm", "--resolution", demand.torque_resolution_Nm);
@@ -80,7 +85,7 @@ void add_design_actuator(CLI::App& design) {
                    "softest impedance that must be rendered at 1 Hz, 20Nm/rad");
   verb->add_option("--collision", flags->collision, "largest force at the link's tip, 150N");
   verb->add_option("--reach", flags->reach, "length of the link; 0.5m if not given");
-  verb->add_option("--link-inertia", flags->demand.link_inertia_kg_m2, "in kg m2")
+  verb->add_option("--link-inertia", flags->link_inertia, "moment of inertia of the link")
       ->capture_default_str();
   verb->add_option("--resolution", flags->resolution, "of the torque by the spring, 0.05Nm");
   verb->add_option("--encoder-bits", flags->demand.envelope.encoder_bits, "around the spring")

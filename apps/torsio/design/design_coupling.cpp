@@ -19,6 +19,7 @@ struct CouplingFlags {
   std::string angle, length, modulus, torque, strain, metric = "0.8mm";
   std::string half_width, root, flank, taper, slot, ring;
   std::string mesh = "medium";
+  std::string time_limit = "120s";
   std::string sheet, resume;
   std::size_t shapes = 0;
   std::uint64_t seed = 1;
@@ -60,6 +61,7 @@ torsio::design::CouplingDemand demand_of(const CouplingFlags& flags) {
   demand.angle_deg = torsio::deg_from_rad(needed(flags.angle, "rad", "--angle"));
   demand.length_mm = length_mm(flags.length, "--length", demand.length_mm);
   demand.finest_mesh = mesh_level(flags.mesh);
+  demand.limits.time_s = needed(flags.time_limit, "s", "--time-limit");
   return demand;
 }
 
@@ -102,7 +104,9 @@ void search(const CouplingFlags& flags) {
            .advice = "Give the dimensions of the best shape to a second call."});
   torsio::design::CouplingSearchSettings settings{
       .demand = flags.demand, .shapes = flags.shapes, .seed = flags.seed, .resume = flags.resume};
+  require_options("design coupling --search", {{"--shear-modulus", &flags.modulus, "4MPa"}});
   settings.shear_modulus_MPa = shear_modulus_MPa(flags);
+  settings.demand.limits.time_s = needed(flags.time_limit, "s", "--time-limit");
   settings.demand.length_mm = kMillimetres * quantity(flags.length, "m", "--length",
                                                       settings.demand.length_mm / kMillimetres);
   if (const auto limit = limit_of(flags)) settings.limit = *limit;
@@ -117,12 +121,9 @@ void run(const CouplingFlags& flags) {
   flags.outputs.check({flags.sheet});
   require_ending("--sheet", flags.sheet, {".yaml", ".yml"});
   if (flags.shapes > 0) return search(flags);
-  if (flags.modulus.empty() == flags.torque.empty())
-    throw torsio::UsageError(
-        {.place = "--shear-modulus, --measured-torque",
-         .expected = "one of the two",
-         .found = flags.modulus.empty() ? "none" : "both",
-         .advice = "the hardness fixes the modulus only within a factor of 4 to 5"});
+  require_options("design coupling", {{"--angle", &flags.angle, "6deg"},
+                                      {"--measured-torque", &flags.torque, "13.6Nm",
+                                       "--shear-modulus", &flags.modulus}});
   const CouplingDemand demand = demand_of(flags);
   const auto limit = limit_of(flags);
   double modulus_MPa = 0.0;
@@ -178,7 +179,8 @@ void add_design_coupling(CLI::App& design) {
                    "alpha, beta, gamma, delta, epsilon, zeta or eta of paper 003")
       ->capture_default_str();
   verb->add_option("--angle", flags->angle, "largest twist, 6deg");
-  verb->add_option("--shear-modulus", flags->modulus, "of the rubber, 4MPa");
+  verb->add_option("--shear-modulus", flags->modulus,
+                   "of the rubber, 4MPa; its hardness gives it only within a factor of 4 to 5");
   verb->add_option("--measured-torque", flags->torque,
                    "in its place, the torque measured at --angle, 13.6Nm");
   verb->add_option("--bulk-ratio", flags->demand.bulk_ratio, "bulk over shear modulus")
@@ -205,7 +207,7 @@ void add_design_coupling(CLI::App& design) {
       ->capture_default_str();
   verb->add_option("--jobs", flags->demand.jobs, "solvers at the same time, 1 or 2")
       ->capture_default_str();
-  verb->add_option("--time-limit", flags->demand.limits.time_s, "of one run of the solver, in s")
+  verb->add_option("--time-limit", flags->time_limit, "of one run of the solver")
       ->capture_default_str();
   verb->add_option("--sheet", flags->sheet, "write a data sheet for torsio simulate, FILE.yaml");
   verb->add_option(

@@ -1,5 +1,7 @@
 #include "design/design_flags.hpp"
 
+#include <fmt/format.h>
+
 #include "common/data_flags.hpp"
 #include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
@@ -44,6 +46,29 @@ double needed(const std::string& text, const char* unit, const char* flag) {
     throw torsio::UsageError(
         {.place = flag, .expected = std::string("a value in ") + unit, .found = "nothing"});
   return torsio::quantity_with_unit(text, unit, flag);
+}
+
+void require_options(const char* verb, const std::vector<NeededOption>& options) {
+  std::string missing;
+  std::string example;
+  std::size_t count = 0;
+  for (const NeededOption& option : options) {
+    const bool has_other = option.other_text != nullptr && !option.other_text->empty();
+    if (!option.text->empty() && has_other)
+      throw torsio::UsageError({.place = fmt::format("{}, {}", option.flag, option.other_flag),
+                                .expected = "one of the two",
+                                .found = "both"});
+    if (!option.text->empty() || has_other) continue;
+    ++count;
+    missing += fmt::format("{}{}", missing.empty() ? "" : ", ", option.flag);
+    if (option.other_flag != nullptr) missing += fmt::format(" or {}", option.other_flag);
+    example += fmt::format("{}{} {}", example.empty() ? "" : " ", option.flag, option.example);
+  }
+  if (missing.empty()) return;
+  throw torsio::UsageError({.place = verb,
+                            .expected = missing,
+                            .found = count > 1 ? "a call without them" : "a call without it",
+                            .advice = "Add for example " + example + "."});
 }
 
 std::string sheet_text(const torsio::DataSheet& sheet, const std::string& file) {

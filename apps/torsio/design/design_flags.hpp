@@ -31,6 +31,18 @@ struct DesignOutputs {
 /// The same for a flag that must be given.
 [[nodiscard]] double needed(const std::string& text, const char* unit, const char* flag);
 
+/// An option without which a design cannot begin, or two of which one is needed.
+struct NeededOption {
+  const char* flag;
+  const std::string* text;  ///< as given; empty: not given
+  const char* example;      ///< "120Nm"
+  const char* other_flag = nullptr;
+  const std::string* other_text = nullptr;
+};
+/// @throws torsio::UsageError that names all that are missing, or the first two that exclude each other.
+/// @param verb "design spring"
+void require_options(const char* verb, const std::vector<NeededOption>& options);
+
 /// The text of a sheet for the file that --sheet names, read again. @throws torsio::UsageError if
 /// `simulate` would refuse it, as for a name with a space; "" if no file is named.
 [[nodiscard]] std::string sheet_text(const torsio::DataSheet& sheet, const std::string& file);

@@ -14,18 +14,19 @@ struct SpringFlags {
   std::string torque, angle, stiffness, diameter, length, bore;
   std::string table, material = "50CrV4", washers, sheet;
   double safety = 1.0;
-  double load_inertia_kg_m2 = 0.15;
+  std::string load_inertia = "0.15kgm2";
   double bits = 19.0;
   DesignOutputs outputs;
 };
 
 torsio::SpringDemand demand_of(const SpringFlags& flags) {
+  require_options("design spring",
+                  {{"--torque", &flags.torque, "120Nm"},
+                   {"--angle", &flags.angle, "6deg", "--stiffness", &flags.stiffness},
+                   {"--max-diameter", &flags.diameter, "60mm"},
+                   {"--max-length", &flags.length, "120mm"}});
   torsio::SpringDemand demand;
   demand.torque_Nm = needed(flags.torque, "Nm", "--torque");
-  if (flags.angle.empty() == flags.stiffness.empty())
-    throw torsio::UsageError({.place = "--angle, --stiffness",
-                              .expected = "one of the two",
-                              .found = flags.angle.empty() ? "none" : "both"});
   demand.angle_rad = flags.angle.empty()
                          ? demand.torque_Nm / needed(flags.stiffness, "Nm_rad", "--stiffness")
                          : needed(flags.angle, "rad", "--angle");
@@ -33,7 +34,7 @@ torsio::SpringDemand demand_of(const SpringFlags& flags) {
   demand.largest_length_m = needed(flags.length, "m", "--max-length");
   demand.bore_m = quantity(flags.bore, "m", "--bore", 0.0);
   demand.safety = flags.safety;
-  demand.load_inertia_kg_m2 = flags.load_inertia_kg_m2;
+  demand.load_inertia_kg_m2 = needed(flags.load_inertia, "kg_m2", "--load-inertia");
   demand.encoder_bits = flags.bits;
   demand.material =
       torsio::find_entry(torsio::read_materials(flags.table), flags.material, "--material");
@@ -46,9 +47,11 @@ void run(const SpringFlags& flags) {
   flags.outputs.check({flags.sheet});
   require_ending("--sheet", flags.sheet, {".yaml", ".yml"});
   const torsio::SpringDemand demand = demand_of(flags);
+  const bool is_any = flags.kind == "any";
+  const auto wanted = is_any ? SpringKind::rod : torsio::spring_kind(flags.kind);
+  const auto kinds = torsio::design_springs(demand);
   const torsio::SpringDesign design =
-      flags.kind == "any" ? torsio::design_lightest_spring(demand)
-                          : torsio::design_spring(demand, torsio::spring_kind(flags.kind));
+      is_any ? torsio::lightest_spring(kinds) : kinds.at(static_cast<std::size_t>(wanted));
   const bool is_rod = design.kind == SpringKind::rod || design.kind == SpringKind::tube;
   if (design.is_feasible && !flags.outputs.dxf.empty() && !is_rod)
     throw torsio::UsageError({.place = "--dxf",
@@ -58,7 +61,7 @@ void run(const SpringFlags& flags) {
   const std::string sheet =
       design.is_feasible ? sheet_text(torsio::spring_sheet(demand, design, name), flags.sheet)
                          : std::string();
-  flags.outputs.write(torsio::spring_report(demand, design));
+  flags.outputs.write(torsio::spring_report(demand, design, kinds));
   if (!flags.outputs.dxf.empty())
     write_text(flags.outputs.dxf,
                torsio::dxf_of_rod(design.outer_m, design.inner_m, design.length_m));
@@ -75,7 +78,8 @@ void add_design_spring(CLI::App& design) {
       "Example: torsio design spring --torque 120Nm --angle 6deg --max-diameter 20mm\n"
       "           --max-length 120mm --bore 10mm --sheet joint.yaml\n"
       "torsio simulate joint.yaml static-cycle -o cycle.csv   then measures it.");
-  verb->add_option("--kind", flags->kind, "rod, tube, coils, discs; any: the lightest")
+  verb->add_option("--kind", flags->kind,
+                   "rod, tube, coils, discs; any: the lightest. The table compares all")
       ->capture_default_str();
   verb->add_option("--torque", flags->torque, "largest torque, 120Nm");
   verb->add_option("--angle", flags->angle, "deflection under it, 6deg");
@@ -88,8 +92,7 @@ void add_design_spring(CLI::App& design) {
   verb->add_option("--washers", flags->washers,
                    "YAML table of discs; the shipped one if not given");
   verb->add_option("--safety", flags->safety, "safety factor of the stress")->capture_default_str();
-  verb->add_option("--load-inertia", flags->load_inertia_kg_m2, "of the link, in kg m2")
-      ->capture_default_str();
+  verb->add_option("--load-inertia", flags->load_inertia, "of the link")->capture_default_str();
   verb->add_option("--encoder-bits", flags->bits, "of the encoders around the spring")
       ->capture_default_str();
   verb->add_option("--sheet", flags->sheet, "write a data sheet for torsio simulate, FILE.yaml");

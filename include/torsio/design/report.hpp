@@ -22,12 +22,29 @@ struct DesignSection {
   std::vector<DesignFigure> figures = {};
 };
 
+/// One of several designs that meet the same demand or fail it.
+struct DesignAlternative {
+  std::string name;  ///< "tube"
+  bool is_chosen = false;
+  std::string infeasible = {};  ///< why it does not meet the demand; empty: it does
+  std::vector<DesignFigure> figures =
+      {};  ///< their names and units are those of all rows; empty: infeasible
+};
+
+/// Alternatives side by side: a row each, their figures as columns.
+struct DesignTable {
+  std::string name = {};      ///< "kinds"
+  std::string row_name = {};  ///< "kind"
+  std::vector<DesignAlternative> rows = {};
+};
+
 /// The result of a design: what `torsio design` prints and writes.
 struct DesignReport {
   std::string design;  ///< "rubber-spring"
   bool is_feasible = true;
   std::string infeasible = {};  ///< the bound that contradicts, and the value that it would need
   std::vector<DesignSection> sections = {};
+  std::vector<DesignTable> tables = {};
   std::vector<std::string> notes = {};
   std::vector<ReportFigure> pictures = {};
 

@@ -80,7 +80,7 @@ struct RubberSpringDesign {
 /// @throws UsageError for a demand that is not finite, or bounds that contradict each other.
 [[nodiscard]] RubberSpringDesign design_rubber_spring(const RubberSpringDemand& demand);
 
-/// The design with all that follows from it, and Table I of 002 with the new sensor in it.
+/// The design with all that follows from it.
 [[nodiscard]] DesignReport rubber_spring_report(const RubberSpringDemand& demand);
 
 /// A row of Table I of paper 002.

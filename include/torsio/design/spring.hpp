@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -38,8 +39,11 @@ struct SpringDesign {
   double mass_kg = 0.0;
   double outer_m = 0.0;  ///< diameter: of a rod or tube
   double inner_m = 0.0;
-  double length_m = 0.0;
-  double friction_share = 0.0;  ///< dry friction over the elastic torque (assumed)
+  double length_m = 0.0;    ///< along the axis
+  double envelope_m = 0.0;  ///< diameter of the circle around it
+  double stress_Pa = 0.0;   ///< largest; of discs the compressive one at the middle of the section
+  double fatigue_margin = kNotMeasured;  ///< for fully reversed torque; NaN: not computed (discs)
+  double friction_share = 0.0;           ///< dry friction over the elastic torque (assumed)
   std::vector<std::pair<double, double>> curve =
       {};  ///< deflection [rad], torque [Nm]; empty: a line
   DesignSection dimensions = {};
@@ -66,14 +70,22 @@ struct SpringDesign {
                                        double preload_m, int parallel, int series,
                                        double angle_rad);
 
-/// The lightest spring of a kind (rod and tube: the thinnest). All formulae neglect end effects.
+/// The lightest spring of a kind (rod and tube: the thinnest). All formulae neglect end effects. Wires have
+/// preferred sizes (R'20 of ISO 497), bores those of drills (ISO 235), outer diameters and lengths steps of
+/// 0.1 mm; stiffness and stress are those of the rounded dimensions.
 /// @throws UsageError for a demand that is not finite or contradicts itself.
 [[nodiscard]] SpringDesign design_spring(const SpringDemand& demand, SpringKind kind);
-/// The lightest of all kinds that is feasible; if there is none, the first one.
+/// A design of each kind, in the order of `SpringKind`, with the reason where it is infeasible.
+[[nodiscard]] std::vector<SpringDesign> design_springs(const SpringDemand& demand);
+/// The lightest of them that is feasible; if there is none, an infeasible one with the reasons of all.
+[[nodiscard]] SpringDesign lightest_spring(std::span<const SpringDesign> designs);
+/// `lightest_spring` of `design_springs`, in less time.
 [[nodiscard]] SpringDesign design_lightest_spring(const SpringDemand& demand);
 
 /// The design with encoder resolution as torque, resonance and fatigue margin.
-[[nodiscard]] DesignReport spring_report(const SpringDemand& demand, const SpringDesign& design);
+/// @param kinds designs of all kinds, for the table; the row of the design's kind is marked
+[[nodiscard]] DesignReport spring_report(const SpringDemand& demand, const SpringDesign& design,
+                                         std::span<const SpringDesign> kinds = {});
 
 /// Adds a note with the safety factor that makes a spring last that does not.
 void note_fatigue(DesignReport& report, const SpringDemand& demand, const SpringDesign& design);
