@@ -75,6 +75,7 @@ int run(int argc, char** argv) {
   add_simulate(app);
   add_arm(app);
   add_joint(app);
+  add_map(app);
   add_check(app);
   add_fit(app);
   add_identify(app);

@@ -18,6 +18,7 @@ void add_compare(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);
+void add_map(CLI::App& app);
 void add_adapt(CLI::App& app);
 void add_attribute(CLI::App& app);
 void add_import(CLI::App& app);

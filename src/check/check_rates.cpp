@@ -12,14 +12,12 @@
 
 #include "check/checker.hpp"
 #include "check/mapping_advice.hpp"
-#include "torsio/core/estimate.hpp"
+#include "check/rate_factor.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRateWindow_s = 0.05;
-constexpr double kFollowsAngle = 0.9;  ///< correlation with the derivative
 constexpr double kNearFactor = 1.05;
 constexpr double kOtherFactor = 1.25;
 
@@ -49,35 +47,6 @@ std::vector<double> angle_of_rate(const Recording& recording, std::string_view q
   const std::vector<double> joint = bridged(recording.channel("joint_angle_rad"));
   for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= joint[i];
   return difference;
-}
-
-/// The means over the same windows as `movement`, by the trapezoidal rule.
-std::vector<double> means_over(const std::vector<double>& values, std::size_t half_window) {
-  std::vector<double> means(values.size(), kNotMeasured);
-  for (std::size_t i = half_window; i + half_window < values.size(); ++i) {
-    double sum = 0.5 * (values[i - half_window] + values[i + half_window]);
-    for (std::size_t k = i - half_window + 1; k < i + half_window; ++k) sum += values[k];
-    means[i] = sum / static_cast<double>(2 * half_window);
-  }
-  return means;
-}
-
-struct RateFactor {
-  double factor = 1.0;
-  double together = 0.0;
-};
-
-/// How many times the derivative a speed is; empty if they are not correlated.
-std::optional<RateFactor> factor_of_rate(const std::vector<double>& speed,
-                                         const std::vector<double>& angle, double sample_rate_Hz) {
-  const auto half_window =
-      static_cast<std::size_t>(std::max(1.0, std::round(kRateWindow_s * sample_rate_Hz)));
-  Pair pair{movement(angle, half_window), means_over(speed, half_window)};
-  for (double& moved : pair.input) moved *= sample_rate_Hz / static_cast<double>(2 * half_window);
-  RateFactor found{.together = correlation(pair.input, pair.target)};
-  if (std::abs(found.together) < kFollowsAngle) return {};
-  found.factor = line_through(pair).slope;
-  return found;
 }
 
 /// The unit whose numbers are `factor` times those of the assumed unit; null if it is none of the usual ones.

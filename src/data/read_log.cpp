@@ -28,6 +28,7 @@
 #include "data/ros/message_topics.hpp"
 #include "data/yaml_reader.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -247,10 +248,8 @@ bool has_all(const std::vector<NamedArray>& arrays, const std::vector<std::strin
   });
 }
 
-}  // namespace
-
-LogTable read_log(const std::string& path, const ReadLogOptions& options) {
-  const OpenFiles files(path, options.progress);
+LogTable table_of_files(const OpenFiles& files, const std::string& path,
+                        const ReadLogOptions& options) {
   const std::string name = name_of(path);
   const Format format = files.format();
   refuse_if_foreign(files);
@@ -275,8 +274,6 @@ LogTable read_log(const std::string& path, const ReadLogOptions& options) {
   table.source.sha256 = files.sha256();
   return table;
 }
-
-namespace {
 
 /// The entries of a log of BAM as one topic, with the header.
 LogSummary summary_of_bam(LogTable table) {
@@ -303,7 +300,37 @@ LogSummary summary_of_bam(LogTable table) {
           .labels = std::move(table.labels)};
 }
 
+/// The column of the time stamps, if its unit shows it.
+const LogColumn* clock_of(const LogTable& table) {
+  const auto is_clock = [](const LogColumn& column) {
+    const auto name = split_channel_name(column.full_name());
+    return column.time == TimeKind::date_time || column.time == TimeKind::time_of_day ||
+           (name && name->unit->si_suffix == "s" && std::ranges::is_sorted(column.values));
+  };
+  const auto at = std::ranges::find_if(table.columns, is_clock);
+  return at == table.columns.end() ? nullptr : &*at;
+}
+
+LogSummary summary_of_table(const LogTable& table) {
+  LogSummary summary{.columns = column_summaries(table),
+                     .rows = table.rows(),
+                     .not_read = table.not_read,
+                     .notes = table.notes,
+                     .is_unfinished = table.is_unfinished};
+  if (const LogColumn* const clock = clock_of(table); clock != nullptr) {
+    const auto name = split_channel_name(clock->full_name());
+    const double scale = clock->time == TimeKind::none && name ? name->unit->scale : 1.0;
+    summary.clock = clock->name;
+    summary.duration_s = scale * (clock->values.back() - clock->values.front());
+  }
+  return summary;
+}
+
 }  // namespace
+
+LogTable read_log(const std::string& path, const ReadLogOptions& options) {
+  return table_of_files(OpenFiles(path, options.progress), path, options);
+}
 
 LogSummary list_log(const std::string& path, const Progress& progress) {
   const OpenFiles files(path, progress);
@@ -312,11 +339,8 @@ LogSummary list_log(const std::string& path, const Progress& progress) {
   if (format == Format::bam)
     return summary_of_bam(read_bam_log(*files.sources.front(), name_of(path), progress));
   if (!has_messages(format))
-    throw Error({.place = name_of(path),
-                 .expected = "a file of messages: MCAP, a bag of ROS 1, or the folder or database "
-                             "of rosbag2; or a log of BAM",
-                 .found = "another file",
-                 .advice = "The columns of a CSV file are in its first line."});
+    return summary_of_table(
+        table_of_files(files, path, {.progress = progress, .csv = {.leaves_out_texts = true}}));
   return summary_of_messages(OpenMessages(files, format, progress).all());
 }
 

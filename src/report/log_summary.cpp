@@ -20,9 +20,64 @@ double rate_Hz(const TopicSummary& topic) {
              : 0.0;
 }
 
+std::string number_text(double value) { return fmt::format("{:.6g}", value); }
+
+/// How often the column has a new value: per second where the clock is known, else per row.
+std::string fresh_text(const ColumnSummary& column, const LogSummary& summary) {
+  if (column.fresh == 0) return "-";
+  if (column.fresh == 1) return "constant";
+  const auto values = static_cast<double>(column.fresh - 1);
+  if (summary.duration_s > 0.0) return fmt::format("{:.4g} Hz", values / summary.duration_s);
+  return fmt::format("1 in {:.3g} rows", static_cast<double>(summary.rows - 1) / values);
+}
+
+std::string columns_text(const LogSummary& summary) {
+  TextTable table;
+  table.header({"column", "unit", "from", "lowest", "highest", "new values", "rate", "empty",
+                "first values"});
+  for (const ColumnSummary& column : summary.columns) {
+    std::string first;
+    for (const double value : column.first)
+      first += (first.empty() ? "" : " ") + number_text(value);
+    const bool is_empty = column.measured == 0;
+    table.row({column.name, column.unit.empty() ? "?" : column.unit,
+               std::string(name(column.unit_origin)), is_empty ? "" : number_text(column.lowest),
+               is_empty ? "" : number_text(column.highest), fmt::format("{}", column.fresh),
+               fresh_text(column, summary), fmt::format("{}", column.empty), first});
+  }
+  std::string text = table.text() + fmt::format("\n{} rows", summary.rows);
+  text += summary.duration_s > 0.0
+              ? fmt::format(", {:.4g} s by '{}'\n", summary.duration_s, summary.clock)
+              : ", no column shows that it is the clock\n";
+  for (const std::string& left_out : summary.not_read) text += "not read: " + left_out + "\n";
+  for (const std::string& note : summary.notes) text += note + "\n";
+  return text;
+}
+
+nlohmann::ordered_json columns_json(const LogSummary& summary) {
+  nlohmann::ordered_json columns = nlohmann::ordered_json::array();
+  for (const ColumnSummary& column : summary.columns) {
+    const bool is_empty = column.measured == 0;
+    const auto number = [&](double value) {
+      return is_empty ? nlohmann::ordered_json() : nlohmann::ordered_json(value);
+    };
+    columns.push_back({{"column", column.name},
+                       {"unit", column.unit},
+                       {"unit_from", name(column.unit_origin)},
+                       {"lowest", number(column.lowest)},
+                       {"highest", number(column.highest)},
+                       {"measured", column.measured},
+                       {"new_values", column.fresh},
+                       {"empty", column.empty},
+                       {"first", column.first}});
+  }
+  return columns;
+}
+
 }  // namespace
 
 std::string log_summary_text(const LogSummary& summary) {
+  if (!summary.columns.empty()) return columns_text(summary);
   TextTable table;
   table.header({"topic", "schema", "messages", "Hz", "duration s", "largest gap ms"});
   std::string fields;
@@ -67,6 +122,13 @@ std::string log_summary_json(const LogSummary& summary) {
   }
   nlohmann::ordered_json document{{"topics", std::move(topics)},
                                   {"unfinished", summary.is_unfinished}};
+  if (!summary.columns.empty())
+    document.update({{"columns", columns_json(summary)},
+                     {"rows", summary.rows},
+                     {"clock", summary.clock},
+                     {"duration_s", summary.duration_s},
+                     {"not_read", summary.not_read},
+                     {"notes", summary.notes}});
   for (const auto& [condition, value] : summary.conditions)
     document["conditions"][condition] = value;
   for (const auto& [label, value] : summary.labels) document["labels"][label] = value;

@@ -7,11 +7,13 @@
 
 namespace torsio {
 
-/// Topics with their rates, largest gaps and fields, and what a mapping of them looks like.
+/// Topics with their rates, largest gaps and fields, or columns with units, ranges and rates.
 [[nodiscard]] std::string log_summary_text(const LogSummary& summary);
 
 /// `{"topics": [{"topic", "schema", "encoding", "messages", "rate_Hz", "duration_s",
-/// "largest_gap_s", "fields", "problem"}], "unfinished"}`.
+/// "largest_gap_s", "fields", "problem"}], "unfinished"}`; of a file without topics also `"columns": [{"column", "unit",
+/// "unit_from", "lowest", "highest", "measured", "new_values", "empty", "first"}], "rows", "clock", "duration_s",
+/// "not_read", "notes"`.
 [[nodiscard]] std::string log_summary_json(const LogSummary& summary);
 
 /// "run: motor xl330, trajectory sin_sin"

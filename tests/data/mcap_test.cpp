@@ -354,8 +354,26 @@ TEST(ReadLog, NamesFormatsThatItDoesNotRead) {
   EXPECT_THAT(refused("a run.json", "[{}]"), HasSubstr("run.json'"));  // quoted for the shell
   std::ofstream(folder.path("run.csv")) << "t_s,torque_Nm\n0,1\n";
   EXPECT_EQ(read_log(folder.path("run.csv")).rows(), 1U);
-  EXPECT_THAT(error_message([&] { (void)list_log(folder.path("run.csv")); }),
-              HasSubstr("expected a file of messages"));
+}
+
+TEST(ListLog, HasTheColumnsOfACsvFileWithUnitsRangesAndNewValues) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path("run.csv")) << "t [ms];pos;tau_Nm;note;tau_Nm\n0;1;5;a;1\n10;2;5;b;1\n"
+                                           "20;-3;;c;1\n30;4;6;d;1\n";
+  const LogSummary summary = list_log(folder.path("run.csv"));
+  ASSERT_EQ(summary.columns.size(), 3U);
+  EXPECT_EQ(summary.clock, "t [ms]");
+  EXPECT_NEAR(summary.duration_s, 0.03, 1e-12);
+  EXPECT_EQ(summary.columns[0].unit_origin, UnitOrigin::brackets);
+  EXPECT_EQ(summary.columns[1].unit, "");
+  EXPECT_EQ(summary.columns[1].lowest, -3.0);
+  EXPECT_EQ(summary.columns[1].highest, 4.0);
+  EXPECT_EQ(summary.columns[2].unit_origin, UnitOrigin::name);
+  EXPECT_EQ(summary.columns[2].empty, 1U);
+  EXPECT_EQ(summary.columns[2].fresh, 2U);  // 5, held, nothing, 6
+  EXPECT_EQ(summary.not_read,
+            (std::vector<std::string>{"tau_Nm (column 5: column 3 has the same name)",
+                                      "note (text, in line 2: 'a')"}));
 }
 
 TEST(ListLog, HasTopicsRatesGapsAndFields) {

@@ -208,8 +208,9 @@ void add_check(CLI::App& app) {
                    "held-out recordings: are they inside the training range?");
   verb->add_flag(
       "--list", flags->list,
-      "topics, rates, gaps and fields of an MCAP file or rosbag2 folder, for a mapping; of a "
-      "log of BAM its columns, conditions and labels");
+      "topics, rates, gaps and fields of an MCAP file or rosbag2 folder, for a mapping; columns, "
+      "units, ranges and rates of CSV, .npz and .mat; of a log of BAM its columns, conditions and "
+      "labels");
   verb->add_flag("--advise", flags->advise,
                  "what to record next: the motion or condition whose absence costs most");
   verb->add_option(

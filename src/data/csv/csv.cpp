@@ -114,7 +114,7 @@ class TableParser {
           value = marked_number(cell, number, i);
         value = unless_missing(value, cell, i);
       }
-      columns_[i].values.push_back(value);
+      if (state_[i].is_read) columns_[i].values.push_back(value);
       at = after;
     }
     if (at != end) skip_empty_cells({at, end}, line, number);
@@ -197,12 +197,21 @@ class TableParser {
       }
       if (!state.is_read) continue;
       const auto [first, is_new] = seen.emplace(column.name, column.number);
-      if (!is_new)
+      if (!is_new && options_.rules.leaves_out_texts)
+        leave_out(i, fmt::format("column {}: column {} has the same name", i + 1, first->second));
+      else if (!is_new)
         throw Error(
             {.place = place(table_.header_line, column),
              .problem = fmt::format("duplicate column: column {} has the same name", first->second),
              .advice = "Rename one of them in the file."});
     }
+  }
+
+  /// For a list: the column is not read, for that reason.
+  void leave_out(std::size_t column, const std::string& reason) {
+    state_[column].is_read = false;
+    columns_[column].values.clear();
+    table_.not_read.push_back(fmt::format("{} ({})", printable(columns_[column].name), reason));
   }
 
   void choose_by_cell(std::size_t column, std::string_view cell) {
@@ -257,8 +266,10 @@ class TableParser {
     const std::string text(cell);
     const char* at = text.c_str();
     double value = kNotMeasured;
-    if (!read_decimal(at, value) || at != text.c_str() + text.size())
-      refuse_cell(cell, place(line, column), column.name);
+    if (!read_decimal(at, value) || at != text.c_str() + text.size()) {
+      if (!options_.rules.leaves_out_texts) refuse_cell(cell, place(line, column), column.name);
+      leave_out(index, fmt::format("text, in line {}: '{}'", line, printable(cell)));
+    }
     return unless_missing(value, cell, index);
   }
 

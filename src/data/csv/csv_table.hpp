@@ -23,6 +23,9 @@ struct CsvLimits {
 struct CsvRules {
   /// Whether columns without a unit are read only if they are wanted, or hold dates.
   bool only_wanted = false;
+  /// For a list of what there is: columns of texts, and of a name that another one has, are left out with the reason
+  /// (`LogTable::not_read`), not refused.
+  bool leaves_out_texts = false;
   std::vector<std::string> missing = {};  ///< further cells of what was not measured
   /// Columns in which each number is one, also those of `missing`: the clock, what splits the log, masks.
   std::vector<std::string> complete = {};

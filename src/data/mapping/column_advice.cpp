@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <vector>
 
+#include "core/did_you_mean.hpp"
 #include "core/lower.hpp"
 #include "core/trimmed.hpp"
 #include "data/names.hpp"
@@ -77,17 +79,32 @@ std::string channel_like(std::string_view text) {
   return name.empty() ? "channel" : name;
 }
 
-std::string mapping_line(std::string_view quantity, std::string_view unit, std::string_view column,
-                         std::string_view rest) {
+/// "torque_Nm: {from: torque, unit: Nm}"
+std::string rule_line(std::string_view quantity, std::string_view unit, std::string_view column,
+                      std::string_view rest) {
   const Unit* const known = find_unit(unit);
   const std::string_view si = known != nullptr ? known->si_suffix : unit;
   const bool is_clock = si == "s";
-  return fmt::format("channels: {{{}_{}: {{from: {}, {}}}}}",
-                     is_clock ? "t" : channel_like(quantity), si, yaml_name(column), rest);
+  return fmt::format("{}_{}: {{from: {}, {}}}", is_clock ? "t" : channel_like(quantity), si,
+                     yaml_name(column), rest);
 }
 
-/// "Torque [Nm]", "Winkel (deg)": the name and the unit in brackets at its end.
+/// Numbers of a converter or an encoder, whose size only the user can state.
+bool is_count(std::string_view unit) {
+  constexpr auto kCounts = std::to_array<std::string_view>(
+      {"count", "counts",    "cnt",        "cnts", "tick",  "ticks", "inc",
+       "incs",  "increment", "increments", "lsb",  "raw",   "digit", "digits",
+       "bit",   "bits",      "adc",        "cpr",  "pulse", "pulses"});
+  return std::ranges::find(kCounts, lower(unit)) != kCounts.end();
+}
+
+/// "Torque [Nm]", "Winkel (deg)", "Winkel °": the name and the unit in brackets at its end, or a sign of degrees there.
 std::pair<std::string_view, std::string_view> without_brackets(std::string_view name) {
+  for (const std::string_view sign : {"\xc2\xb0", "\xc2\xb0/s"})
+    if (name.size() > sign.size() && name.ends_with(sign)) {
+      name.remove_suffix(sign.size());
+      return {trimmed(name), sign == "\xc2\xb0" ? "deg" : "deg/s"};
+    }
   if (name.empty() || (name.back() != ']' && name.back() != ')')) return {name, {}};
   const auto open = name.find_last_of(name.back() == ']' ? '[' : '(');
   if (open == std::string_view::npos || open == 0) return {name, {}};
@@ -113,7 +130,8 @@ std::string yaml_name(std::string_view text) {
 }
 
 const Unit* unit_in_words(std::string_view written) {
-  const std::string_view text = without_frame(written);
+  std::string_view text = without_frame(written);
+  if (text.size() > 1 && text.front() == '_') text.remove_prefix(1);  // as names end: "_1"
   if (const Unit* const unit = find_written_unit(text)) return unit;
   std::string plain;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -151,36 +169,72 @@ std::optional<NameInBrackets> unit_in_brackets(std::string_view name) {
 
 bool is_like_clock(std::string_view column_name) { return unit_of_quantity(column_name) == "s"; }
 
-std::string advice_without_unit(std::string_view column) {
-  const std::string drop = fmt::format("  or leave it out:  drop: [{}]", yaml_name(column));
-  auto [quantity, unit] = without_brackets(column);
-  if (unit.empty()) {
-    const auto ending = column.rfind('_');
-    if (ending != std::string_view::npos && ending > 0 && ending + 1 < column.size() &&
-        unit_of_quantity(column.substr(ending + 1)).empty()) {
-      quantity = column.substr(0, ending);
-      unit = column.substr(ending + 1);
-    }
-  }
+namespace {
+
+/// What a column without a known unit may be: the sentence before its line of a mapping, and that line.
+struct Proposal {
+  std::string lead;
+  std::string line;
+};
+
+/// Name and unit of a column, where the unit is written in brackets or after the last underscore.
+std::pair<std::string_view, std::string_view> name_and_unit(std::string_view column) {
+  const auto [quantity, unit] = without_brackets(column);
+  const auto ending = column.rfind('_');
+  if (!unit.empty() || ending == std::string_view::npos || ending == 0 ||
+      ending + 1 >= column.size() || !unit_of_quantity(column.substr(ending + 1)).empty())
+    return {quantity, unit};
+  return {column.substr(0, ending), column.substr(ending + 1)};
+}
+
+Proposal proposal_for(std::string_view column) {
+  const auto [quantity, unit] = name_and_unit(column);
+  if (is_count(unit))
+    return {fmt::format("{} have no size of their own; with COUNTS of them in a revolution, write "
+                        "in a mapping",
+                        unit),
+            rule_line(quantity, "rad", column, "unit: rev, scale: 1/COUNTS")};
   if (const std::string_view meant = unit_meant(unit); !meant.empty())
-    return fmt::format("If that is {}, write in a mapping  {}", meant,
-                       mapping_line(quantity, meant, column, fmt::format("unit: {}", meant))) +
-           drop;
+    return {fmt::format("If that is {}, write in a mapping", meant),
+            rule_line(quantity, meant, column, fmt::format("unit: {}", meant))};
   const std::string_view si = unit_of_quantity(quantity);
   if (si.empty())
-    return fmt::format(
-               "Rename the column to NAME_UNIT, or write in a mapping  channels: {{NAME_UNIT: "
-               "{{from: {}, unit: UNIT}}}}",
-               yaml_name(column)) +
-           drop;
+    return {"Rename the column to NAME_UNIT, or write in a mapping",
+            fmt::format("NAME_UNIT: {{from: {}, unit: UNIT}}", yaml_name(column))};
   if (unit.empty())
-    return fmt::format("Rename the column, or specify its unit in a mapping; if it is {0}:  {1}",
-                       si, mapping_line(quantity, si, column, fmt::format("unit: {}", si))) +
-           drop;
-  return fmt::format(
-             "Specify in a mapping how many {0} one {1} is:  {2}", si, unit,
-             mapping_line(quantity, si, column, fmt::format("unit: {}, scale: FACTOR", si))) +
-         drop;
+    return {fmt::format("Rename the column, or specify its unit in a mapping; if it is {}:", si),
+            rule_line(quantity, si, column, fmt::format("unit: {}", si))};
+  return {fmt::format("Specify in a mapping how many {} one {} is:", si, unit),
+          rule_line(quantity, si, column, fmt::format("unit: {}, scale: FACTOR", si))};
+}
+
+}  // namespace
+
+std::string mapping_entry(std::string_view column) { return proposal_for(column).line; }
+
+std::string advice_without_unit(std::string_view column) {
+  const Proposal proposal = proposal_for(column);
+  return fmt::format("{}  channels: {{{}}}  or leave it out:  drop: [{}]", proposal.lead,
+                     proposal.line, yaml_name(column));
+}
+
+std::string advice_on_written_unit(std::string_view written, std::string_view si_unit) {
+  if (is_count(without_frame(written)))
+    return si_unit == "rad"
+               ? "Counts have no size of their own: with COUNTS of them in a revolution, write  "
+                 "unit: rev, scale: 1/COUNTS"
+               : fmt::format(
+                     "Counts have no size of their own: write  unit: {}, scale: FACTOR  "
+                     "with the {} of one count",
+                     si_unit, si_unit == "1" ? "value" : si_unit);
+  std::vector<std::string_view> names;
+  for (const Unit& unit : known_units()) names.push_back(unit.suffix);
+  const std::string nearest = did_you_mean(without_frame(written), names);
+  return (nearest.empty() ? "" : nearest + " ") +
+         fmt::format(
+             "Another unit is read as  unit: {0}, scale: FACTOR  with the {0} of one of "
+             "it.\n  Known units: {1}",
+             si_unit, known_unit_list());
 }
 
 }  // namespace torsio

@@ -13,6 +13,13 @@ namespace torsio {
 /// for a known one.
 [[nodiscard]] std::string advice_without_unit(std::string_view column_name);
 
+/// The line of `channels:` in that advice: "torque_Nm: {from: torque, unit: Nm}".
+[[nodiscard]] std::string mapping_entry(std::string_view column_name);
+
+/// What to write for a text after `unit:` that is not a known unit, with the list of those last.
+[[nodiscard]] std::string advice_on_written_unit(std::string_view written,
+                                                 std::string_view si_unit);
+
 /// A text of a mapping, in quotes if it needs them.
 [[nodiscard]] std::string yaml_name(std::string_view text);
 

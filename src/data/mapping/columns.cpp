@@ -11,6 +11,7 @@
 
 #include "data/log_table.hpp"
 #include "data/mapping/column_advice.hpp"
+#include "data/mapping/columns_without_unit.hpp"
 #include "data/mapping/number_coding.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
@@ -110,34 +111,6 @@ TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
           .column = &column};
 }
 
-std::string common_start(const std::vector<std::string>& names) {
-  std::string start = names.front();
-  for (const std::string& name : names)
-    while (!name.starts_with(start)) start.pop_back();
-  return start;
-}
-
-/// The other columns without a unit, for the advice on the first.
-std::string advice_on_others(const LogTable& table, const LogColumn& column) {
-  std::vector<std::string> names;
-  std::vector<std::string> sound;
-  for (const LogColumn& other : table.columns)
-    (other.has_unit() || other.time != TimeKind::none ? sound : names).push_back(other.name);
-  if (names.size() < 2 || names.front() != column.name) return {};
-  std::string pattern = common_start(names) + "*";
-  std::vector<std::string> dropped;
-  dropped.reserve(names.size());
-  for (const std::string& name : names) dropped.push_back(yaml_name(name));
-  constexpr std::size_t kMaxListed = 8;
-  if (names.size() > kMaxListed && pattern.size() > 1 &&
-      std::ranges::none_of(sound, [&](const auto& name) { return is_matched(name, pattern); }))
-    dropped = {yaml_name(pattern)};
-  return fmt::format(
-      "\n  {} columns have no unit. A mapping with channels: reads of these only the ones that it "
-      "names; without channels:, leave them out:  drop: [{}]",
-      names.size(), joined(dropped));
-}
-
 /// @param in_name the unit in the full name, which is that in brackets only if there is no other
 void refuse_conflict(const LogTable& table, const LogColumn& column, const Unit& in_name) {
   const auto in_brackets = unit_in_brackets(column.name);
@@ -151,21 +124,10 @@ void refuse_conflict(const LogTable& table, const LogColumn& column, const Unit&
                                      column.full_name(), yaml_name(column.name), column.unit)});
 }
 
+/// @param column has a unit
 TableChannel channel_from_column(LogColumn& column, const UsedTable& used) {
   const std::string full_name = column.full_name();
   const auto name = split_channel_name(full_name);
-  if (!name) {
-    const auto ending = column.name.rfind('_');
-    const bool has_ending = ending != std::string::npos && ending + 1 < column.name.size();
-    throw Error(
-        {.place = used.table().header_place(column),
-         .problem = has_ending
-                        ? fmt::format("'{}' is not a known unit", column.name.substr(ending + 1))
-                        : "the name has no unit",
-         .expected = "a name that ends in one of " + known_unit_list(),
-         .found = "'" + printable(column.name) + "'",
-         .advice = advice_without_unit(column.name) + advice_on_others(used.table(), column)});
-  }
   refuse_conflict(used.table(), column, *name->unit);
   const bool is_time = column.time != TimeKind::none;
   return {.channel = {.name = name->si(),
@@ -357,6 +319,7 @@ TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {
     all.push_back(channel_from_rule(rule, used, mapping.file));
     consumed.insert(all.back().column);
   }
+  if (mapping.channels.empty() && table.has_units) refuse_columns_without_unit(table, consumed);
   std::vector<std::string> left_out;
   for (LogColumn& column : table.columns) {
     if (consumed.contains(&column)) continue;

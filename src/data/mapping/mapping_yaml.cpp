@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "data/mapping/column_advice.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/ready_mappings.hpp"
 #include "data/names.hpp"
@@ -14,6 +15,14 @@
 
 namespace torsio {
 namespace {
+
+/// Also `[ms]`, which YAML reads as a list.
+std::string written_unit(const YamlValue& yaml) {
+  if (yaml.is_scalar()) return yaml.text();
+  const std::vector<std::string> texts = yaml.texts();
+  if (texts.size() != 1) yaml.refuse("one unit, such as deg");
+  return texts.front();
+}
 
 ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
   ChannelRule rule{.name = name, .from = {}, .unit = {}};
@@ -26,8 +35,11 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
       {"from", "unit", "sign", "scale", "offset", "gear_ratio", "sign_bit", "modulus", "unwrap"});
   rule.from = yaml.at("from").text();
   if (const auto unit = yaml.find("unit")) {
-    const Unit* const known = find_written_unit(unit->text());
-    if (known == nullptr) unit->refuse("a known unit: " + known_unit_list());
+    const std::string written = written_unit(*unit);
+    const Unit* const known = unit_in_words(written);
+    if (known == nullptr)
+      unit->refuse("a unit",
+                   advice_on_written_unit(written, split_channel_name(si_name)->unit->si_suffix));
     rule.unit = known->suffix;
   }
   if (const auto sign = yaml.find("sign")) {

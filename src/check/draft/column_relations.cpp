@@ -1,0 +1,140 @@
+#include "check/draft/column_relations.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "numerics/quantile.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kFewestRows = 50;
+
+/// The rows in which all numbers were measured.
+struct KnownRows {
+  Eigen::MatrixXd inputs;  ///< 1, joint and torque, if there is one
+  Eigen::VectorXd motor;
+};
+
+KnownRows known_rows(const std::vector<double>& motor, const std::vector<double>& joint,
+                     const std::vector<double>& torque) {
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < motor.size(); ++i)
+    if (std::isfinite(motor[i]) && std::isfinite(joint[i]) &&
+        (torque.empty() || std::isfinite(torque[i])))
+      rows.push_back(i);
+  KnownRows known{.inputs = Eigen::MatrixXd::Ones(static_cast<Eigen::Index>(rows.size()),
+                                                  torque.empty() ? 2 : 3),
+                  .motor = Eigen::VectorXd(static_cast<Eigen::Index>(rows.size()))};
+  for (Eigen::Index row = 0; row < known.motor.size(); ++row) {
+    const std::size_t i = rows[static_cast<std::size_t>(row)];
+    known.motor[row] = motor[i];
+    known.inputs(row, 1) = joint[i];
+    if (!torque.empty()) known.inputs(row, 2) = torque[i];
+  }
+  return known;
+}
+
+/// What a fit leaves, and its coefficients.
+struct Fitted {
+  Eigen::VectorXd coefficients;
+  double left = 0.0;
+};
+
+Fitted fitted(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& motor) {
+  Fitted fit{.coefficients = inputs.colPivHouseholderQr().solve(motor)};
+  fit.left = (motor - inputs * fit.coefficients).squaredNorm();
+  return fit;
+}
+
+double width(const Eigen::VectorXd& values) { return values.maxCoeff() - values.minCoeff(); }
+
+}  // namespace
+
+std::optional<GearFit> fit_gear(const std::vector<double>& motor, const std::vector<double>& joint,
+                                const std::vector<double>& torque) {
+  const KnownRows known = known_rows(motor, joint, torque);
+  const auto rows = static_cast<std::size_t>(known.motor.size());
+  if (rows < kFewestRows || !(width(known.inputs.col(1)) > 0.0) || !(width(known.motor) > 0.0))
+    return std::nullopt;
+  const Fitted with_joint = fitted(known.inputs.leftCols(2), known.motor);
+  const bool has_torque = !torque.empty() && width(known.inputs.col(2)) > 0.0;
+  const Fitted fit = has_torque ? fitted(known.inputs, known.motor) : with_joint;
+  const double variance = (known.motor.array() - known.motor.mean()).square().sum();
+  GearFit gear{.factor = fit.coefficients[1], .explained = 1.0 - fit.left / variance};
+  const Eigen::VectorXd joint_values = known.inputs.col(1);
+  const double joint_variance = (joint_values.array() - joint_values.mean()).square().sum();
+  gear.error = std::sqrt(fit.left / static_cast<double>(rows - 2) / joint_variance);
+  if (has_torque) {
+    gear.per_torque = fit.coefficients[2];
+    gear.by_torque = with_joint.left > 0.0 ? 1.0 - fit.left / with_joint.left : 0.0;
+  }
+  return gear;
+}
+
+double plausible_ratio(const GearFit& fit) {
+  constexpr double kNear = 0.005;
+  constexpr double kErrors = 3.0;
+  const double ratio = std::abs(fit.factor);
+  const double whole = std::round(ratio);
+  if (whole >= 1.0 && std::abs(ratio - whole) <= std::max(kNear * ratio, kErrors * fit.error))
+    return whole;
+  const double digits = std::pow(10.0, 3.0 - std::floor(std::log10(ratio)));
+  return std::round(ratio * digits) / digits;
+}
+
+bool is_of_zeros_and_ones(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [](double x) { return x == 0.0 || x == 1.0; }) &&
+         std::ranges::find(values, 0.0) != values.end() &&
+         std::ranges::find(values, 1.0) != values.end();
+}
+
+bool is_mask_of(const std::vector<double>& mask, const std::vector<double>& values) {
+  constexpr double kMost = 0.8;
+  std::size_t marked = 0;
+  std::size_t changes = 0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const bool is_change = values[i] != values[i - 1] && std::isfinite(values[i]);
+    if (is_change && mask[i] == 0.0) return false;
+    if (mask[i] != 0.0) ++marked;
+    if (is_change) ++changes;
+  }
+  return marked > 2 && static_cast<double>(changes) >= kMost * static_cast<double>(marked);
+}
+
+bool is_sparse(const std::vector<double>& values) {
+  constexpr double kFewRows = 0.6;
+  const auto is_measured = [](double x) { return std::isfinite(x); };
+  const auto measured = std::ranges::count_if(values, is_measured);
+  const auto first_half = std::count_if(
+      values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), is_measured);
+  return measured > 4 &&
+         static_cast<double>(measured) < kFewRows * static_cast<double>(values.size()) &&
+         3 * first_half > measured && 3 * (measured - first_half) > measured;
+}
+
+double usual_step(const std::vector<double>& values) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (const double step = values[i] - values[i - 1]; step != 0.0 && std::isfinite(step))
+      steps.push_back(std::abs(step));
+  return steps.empty() ? 0.0 : quantile(std::move(steps), 0.5);
+}
+
+bool is_rising(const std::vector<double>& values) {
+  if (values.size() < 3) return false;
+  std::size_t rises = 0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    if (!(values[i] >= values[i - 1])) return false;
+    if (values[i] > values[i - 1]) ++rises;
+  }
+  return 10 * rises >= values.size();  // coarse stamps repeat
+}
+
+bool has_integers_only(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [](double x) { return std::isnan(x) || x == std::round(x); });
+}
+
+}  // namespace torsio

@@ -1,0 +1,183 @@
+// Sides, gear ratio and signs: how the angles move together, and with the torque.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "check/draft/column_relations.hpp"
+#include "check/draft/draft_steps.hpp"
+#include "check/signal_faults.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kMovesTogether = 0.5;  ///< share of the variance below which nothing is stated
+constexpr double kMovesMuch = 0.99;
+constexpr double kByTorque = 0.1;  ///< share of what is left that shows the torque's sign
+constexpr double kLargestRatio = 400.0;
+constexpr double kSameSide = 0.1;  ///< a ratio that differs less from 1 is none
+
+constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+std::size_t of_side(const DraftWork& work, Side side) {
+  for (const std::size_t i : work.measured(Quantity::angle))
+    if (work.readings[i].side == side) return i;
+  return kNone;
+}
+
+/// Without steps where a slow sensor holds its value.
+std::vector<double> moving(const DraftWork& work, std::size_t column) {
+  return bridged_or_held(
+      {.name = work.draft.columns[column].channel, .values = work.si_values(column)});
+}
+
+void take_side(DraftWork& work, std::size_t column, Side side, Certainty at_most,
+               std::string reason) {
+  ColumnGuess& guess = work.draft.columns[column];
+  work.readings[column].side = side;
+  guess.channel = channel_of(Quantity::angle, side, false) + "_rad";
+  guess.add(at_most, std::move(reason));
+}
+
+/// The two angles before and after the spring, whatever the names state.
+struct Angles {
+  std::size_t before = kNone;
+  std::size_t after = kNone;
+};
+
+Angles angles_by_name(const DraftWork& work) {
+  Angles angles{.before = of_side(work, Side::motor), .after = of_side(work, Side::joint)};
+  if (const std::size_t gear = of_side(work, Side::gear); gear != kNone) {
+    if (angles.after == kNone) angles.after = gear == angles.before ? kNone : angles.after;
+    angles.before = gear;  // nearer to the spring than the rotor
+  }
+  return angles;
+}
+
+/// Two angles, at least one of unknown side: the one that moves farther is the motor's.
+Angles angles_by_width(DraftWork& work, Angles angles) {
+  std::vector<std::size_t> unknown;
+  for (const std::size_t i : work.measured(Quantity::angle))
+    if (work.readings[i].side == Side::unknown) unknown.push_back(i);
+  if (unknown.size() == 1 && (angles.before == kNone) != (angles.after == kNone)) {
+    const bool is_joint = angles.after == kNone;
+    take_side(work, unknown.front(), is_joint ? Side::joint : Side::gear, Certainty::unsure,
+              "name: the other side is named");
+    (is_joint ? angles.after : angles.before) = unknown.front();
+  } else if (unknown.size() == 1 && angles.before == kNone) {
+    take_side(work, unknown.front(), Side::joint, Certainty::likely, "the only angle");
+  } else if (unknown.size() == 2 && angles.before == kNone && angles.after == kNone) {
+    const auto width = [&](std::size_t i) {
+      const ColumnSummary& summary = work.draft.columns[i].summary;
+      return summary.highest - summary.lowest;
+    };
+    const bool is_first = width(unknown[0]) >= width(unknown[1]);
+    angles = {.before = unknown[is_first ? 0 : 1], .after = unknown[is_first ? 1 : 0]};
+    take_side(work, angles.before, Side::gear, Certainty::unsure,
+              "relation: moves farther than the other angle");
+    take_side(work, angles.after, Side::joint, Certainty::unsure,
+              "relation: moves less than the other angle");
+  }
+  return angles;
+}
+
+/// The unit of the motor's angle in which the ratio is one that gears have; the present one otherwise.
+std::string_view unit_by_ratio(const ColumnGuess& motor, double factor) {
+  if (motor.certainty >= Certainty::likely) return motor.unit;
+  const double now = find_unit(motor.unit)->scale;
+  for (const std::string_view unit : {"rad", "deg", "rev"}) {
+    const double ratio = std::abs(factor) * find_unit(unit)->scale / now;
+    const bool is_whole = std::abs(ratio - std::round(ratio)) < 0.01 * ratio;
+    if (is_whole && ratio > 0.99 && ratio < kLargestRatio) return unit;
+  }
+  return motor.unit;
+}
+
+Certainty certainty_of(const GearFit& fit, double ratio) {
+  const bool is_whole = ratio == std::round(ratio);
+  if (fit.explained > 0.9999 && is_whole) return Certainty::sure;
+  if (fit.explained > kMovesMuch && (is_whole || fit.error < 1e-3 * ratio))
+    return Certainty::likely;
+  return Certainty::unsure;
+}
+
+void take_ratio(DraftWork& work, const Angles& angles, GearFit fit) {
+  ColumnGuess& motor = work.draft.columns[angles.before];
+  const std::string& joint = work.draft.columns[angles.after].summary.name;
+  const std::string_view unit = unit_by_ratio(motor, fit.factor);
+  const double change = find_unit(unit)->scale / find_unit(motor.unit)->scale;
+  fit.factor *= change;
+  fit.error *= change;
+  const double ratio = plausible_ratio(fit);
+  if (unit != motor.unit) motor.certainty = Certainty::likely;
+  motor.unit = unit;
+  if (fit.factor < 0.0) motor.sign = -motor.sign;
+  std::string reason =
+      fmt::format("relation: {:.5g} +- {:.1g} times '{}'", fit.factor, fit.error, joint);
+  motor.channel = "gear_angle_rad";
+  work.readings[angles.before].side = Side::gear;
+  if (std::abs(ratio - 1.0) < kSameSide) {
+    motor.add(fit.explained > kMovesMuch ? Certainty::sure : Certainty::likely,
+              reason + ", so that it is after the gear");
+  } else if (ratio < 1.0 || ratio > kLargestRatio) {
+    motor.add(Certainty::unsure, reason);
+    motor.missing = "the gear ratio: check the units of both angles";
+  } else {
+    motor.gear_ratio = ratio;
+    motor.add(certainty_of(fit, ratio), reason);
+  }
+  if (motor.sign < 0.0)
+    motor.add(Certainty::unsure, "relation: one of the two angles has the wrong sign");
+}
+
+void guess_sign_of_torque(DraftWork& work, const GearFit& fit, std::size_t torque) {
+  if (torque == kNone || fit.by_torque < kByTorque) return;
+  ColumnGuess& guess = work.draft.columns[torque];
+  const bool rises = fit.per_torque * fit.factor > 0.0;
+  if (!rises) guess.sign = -guess.sign;
+  guess.add(rises ? Certainty::sure : Certainty::likely,
+            rises ? "relation: rises with the deflection"
+                  : "relation: falls with the deflection, so that its sign is inverted");
+}
+
+/// For a recorded deflection.
+void compare_with_deflection(DraftWork& work, std::size_t torque) {
+  const std::vector<std::size_t> deflections = work.measured(Quantity::deflection);
+  if (torque == kNone || deflections.empty()) return;
+  const auto fit = fit_gear(moving(work, deflections.front()), moving(work, torque), {});
+  if (!fit || fit->explained < kMovesTogether) return;
+  guess_sign_of_torque(work, {.factor = 1.0, .per_torque = fit->factor, .by_torque = 1.0}, torque);
+}
+
+std::size_t torque_of_spring(const DraftWork& work) {
+  for (const std::size_t i : work.measured(Quantity::torque))
+    if (work.readings[i].side != Side::motor) return i;
+  return kNone;
+}
+
+}  // namespace
+
+void guess_gear(DraftWork& work) {
+  const Angles angles = angles_by_width(work, angles_by_name(work));
+  const std::size_t torque = torque_of_spring(work);
+  compare_with_deflection(work, torque);
+  if (angles.before == kNone || angles.after == kNone || angles.before == angles.after) return;
+  ColumnGuess& before = work.draft.columns[angles.before];
+  const auto fit = fit_gear(moving(work, angles.before), moving(work, angles.after),
+                            torque == kNone ? std::vector<double>() : moving(work, torque));
+  if (!fit || fit->explained < kMovesTogether) {
+    before.add(Certainty::unsure, fit ? "relation: it does not move with the joint"
+                                      : "relation: one of the angles does not move");
+    if (work.readings[angles.before].side == Side::motor) {
+      before.channel = "gear_angle_rad";
+      before.missing = "the gear ratio, which the angles do not show: add gear_ratio:";
+    }
+    return;
+  }
+  take_ratio(work, angles, *fit);
+  guess_sign_of_torque(work, *fit, torque);
+}
+
+}  // namespace torsio

@@ -1,0 +1,148 @@
+// What names and units state: quantity, side, clock.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "check/draft/column_relations.hpp"
+#include "check/draft/draft_steps.hpp"
+#include "data/mapping/columns.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+struct UnitOfStep {
+  double largest;  ///< step of a log, in this unit
+  std::string_view unit;
+};
+// Logs of 20 Hz to 20 kHz have steps of 50 us to 50 ms.
+constexpr auto kUnitsOfSteps =
+    std::to_array<UnitOfStep>({{0.05, "s"}, {50.0, "ms"}, {5e4, "us"}, {5e7, "ns"}});
+
+std::string reason_of_unit(const ColumnSummary& summary) {
+  return fmt::format("unit: {} ({})", summary.unit, name(summary.unit_origin));
+}
+
+bool is_rate_of_log(double step_s) { return step_s > 2e-5 && step_s < 5.0; }
+
+/// Its unit by the name, else by the size of the steps.
+void state_unit_of_clock(ColumnGuess& guess, const NameReading& reading, double step) {
+  if (!guess.summary.unit.empty()) return;
+  if (const Unit* const unit = find_unit(reading.unit);
+      unit != nullptr && unit->si_suffix == "s" && is_rate_of_log(step * unit->scale)) {
+    guess.unit = reading.unit;
+    guess.add(Certainty::likely, "unit: " + reading.unit + " (word in the name)");
+    return;
+  }
+  const auto* const fits =
+      std::ranges::find_if(kUnitsOfSteps, [&](const auto& each) { return step <= each.largest; });
+  if (step <= 0.0 || fits == kUnitsOfSteps.end()) return;
+  guess.unit = fits->unit;
+  guess.add(Certainty::likely,
+            fmt::format("values: steps of {:.4g} are those of a log in {}", step, guess.unit));
+}
+
+/// How much speaks for a column as the clock; 0: it is none.
+int score_of_clock(const LogColumn& column, const ColumnSummary& summary,
+                   const NameReading& reading) {
+  if (column.time == TimeKind::date_time || column.time == TimeKind::time_of_day) return 5;
+  if (column.time == TimeKind::date || summary.empty > 0) return 0;
+  const Unit* const unit = find_unit(summary.unit);
+  if (unit != nullptr && unit->si_suffix != "s") return 0;
+  const bool is_time = reading.quantity == Quantity::time || unit != nullptr;
+  const bool has_order = is_rising(column.values);
+  if (!has_order && !(is_time && reading.is_clear)) return 0;
+  if (is_time && has_order) return unit != nullptr ? 7 : reading.is_clear ? 6 : 4;
+  if (is_time) return 2;  // it starts again, or rows come late
+  return reading.quantity == Quantity::unknown ? 1 : 0;
+}
+
+void take_as_clock(DraftWork& work, std::size_t column, int score) {
+  ColumnGuess& guess = work.draft.columns[column];
+  const NameReading& reading = work.readings[column];
+  guess.channel = "t_s";
+  guess.unit = guess.summary.unit;
+  guess.certainty = Certainty::sure;
+  if (score == 1)
+    guess.add(Certainty::likely, "values: the only column that rises all the time");
+  else if (work.table.columns[column].time != TimeKind::none)
+    guess.add(Certainty::sure, "values: dates or times of day");
+  else if (reading.quantity == Quantity::time)
+    guess.add(Certainty::sure, "name: " + reading.word);
+  if (!guess.summary.unit.empty()) guess.add(Certainty::sure, reason_of_unit(guess.summary));
+  const double step = usual_step(work.values(column));
+  state_unit_of_clock(guess, reading, step);
+  const Unit* const unit = find_unit(guess.unit);
+  if (unit != nullptr && step > 0.0) work.draft.rate_Hz = 1.0 / (step * unit->scale);
+  if (unit == nullptr) guess.missing = "the unit of the time: set unit: s, ms, us or ns";
+}
+
+/// The unit is that of another quantity than the name's: the unit counts.
+Quantity by_unit(const NameReading& reading, const Unit& unit) {
+  if (si_unit_of(reading.quantity) == unit.si_suffix) return reading.quantity;
+  return quantity_of_unit(unit.si_suffix);
+}
+
+void guess_one(ColumnGuess& guess, NameReading& reading) {
+  const Unit* const unit = find_unit(guess.summary.unit);
+  if (unit != nullptr) {
+    const Quantity named = reading.quantity;
+    reading.quantity = by_unit(reading, *unit);
+    if (reading.quantity != named && reading.quantity != Quantity::unknown) reading.is_clear = true;
+  }
+  const std::string channel = channel_of(reading.quantity, reading.side, reading.is_goal);
+  if (channel.empty() || reading.quantity == Quantity::time) return;
+  guess.channel = fmt::format("{}_{}", channel, si_unit_of(reading.quantity));
+  guess.certainty = Certainty::sure;
+  if (!reading.word.empty())
+    guess.add(reading.is_clear ? Certainty::sure : Certainty::likely, "name: " + reading.word);
+  if (unit == nullptr) return;
+  guess.unit = guess.summary.unit;
+  guess.add(reading.word.empty() ? Certainty::likely : Certainty::sure,
+            reason_of_unit(guess.summary));
+}
+
+}  // namespace
+
+void guess_clock(DraftWork& work) {
+  std::size_t best = work.size();
+  int best_score = 0;
+  std::size_t rising_unknown = 0;
+  for (std::size_t i = 0; i < work.size(); ++i) {
+    const int score =
+        score_of_clock(work.table.columns[i], work.draft.columns[i].summary, work.readings[i]);
+    if (score == 1) ++rising_unknown;
+    if (score <= best_score) continue;
+    best = i;
+    best_score = score;
+  }
+  if (best_score == 0 || (best_score == 1 && rising_unknown > 1)) {
+    work.draft.remarks.emplace_back(
+        "no column is a clock: state the sample rate,  rate: 1000Hz  in the mapping or --rate");
+    return;
+  }
+  take_as_clock(work, best, best_score);
+}
+
+void guess_quantities(DraftWork& work) {
+  for (std::size_t i = 0; i < work.size(); ++i) {
+    ColumnGuess& guess = work.draft.columns[i];
+    if (!guess.channel.empty()) continue;
+    // A channel of torsio keeps its name.
+    if (const auto own = split_channel_name(guess.summary.name);
+        own && guess.summary.unit_origin == UnitOrigin::name &&
+        !marked_quantity(guess.summary.name).empty()) {
+      work.readings[i].quantity = Quantity::mask;
+      guess.channel = guess.summary.name;
+      guess.unit = own->unit->suffix;
+      guess.certainty = Certainty::sure;
+      guess.reasons = {"name: of a mask"};
+      continue;
+    }
+    guess_one(guess, work.readings[i]);
+  }
+}
+
+}  // namespace torsio

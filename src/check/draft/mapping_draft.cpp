@@ -1,0 +1,193 @@
+#include "check/draft/mapping_draft.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "check/draft/draft_steps.hpp"
+#include "data/mapping/columns.hpp"
+#include "data/mapping/measured_recordings.hpp"
+#include "data/names.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/data/load.hpp"
+
+namespace torsio {
+namespace {
+
+/// A name without what is in brackets or its unit, whose letters would be read as words.
+std::string_view name_without_unit(const ColumnSummary& summary) {
+  const std::string_view name = summary.name;
+  if (summary.unit_origin == UnitOrigin::brackets)
+    return name.substr(0, name.find_last_of("[(\xc2"));
+  if (const auto parts = split_channel_name(name); parts && summary.unit_origin == UnitOrigin::name)
+    return parts->quantity;
+  return name;
+}
+
+void require_numbers(const LogTable& table) {
+  const bool has_numbers = std::ranges::any_of(table.columns, [](const LogColumn& column) {
+    return std::ranges::any_of(column.values, [](double x) { return std::isfinite(x); });
+  });
+  if (has_numbers) return;
+  throw Error({.place = table.source.file,
+               .problem = "no column of numbers",
+               .expected = "a recording with at least a time and one measured quantity",
+               .found = table.column_list(),
+               .advice = "torsio check --list shows what a file contains."});
+}
+
+void require_motion(const LogTable& table, const MappingDraft& draft) {
+  const bool moves = std::ranges::any_of(draft.columns, [](const ColumnGuess& guess) {
+    return guess.channel != "t_s" && guess.summary.fresh > 1;
+  });
+  if (moves) return;
+  throw Error({.place = table.source.file,
+               .problem = draft.columns.size() > 1 ? "all columns are constant"
+                                                   : "the only column is a time or constant",
+               .expected = "columns whose values change",
+               .found = table.column_list(),
+               .advice = "Record while the joint moves, or name the right file."});
+}
+
+/// Columns of a name with a unit that cannot be read must be left out by name.
+std::vector<std::string> dropped_names(const LogTable& table) {
+  std::vector<std::string> names;
+  for (const std::string& left_out : table.not_read)
+    if (const auto at = left_out.rfind(" ("); at != std::string::npos)
+      names.push_back(left_out.substr(0, at));
+  return names;
+}
+
+/// @returns whether a recording can be read with this clock
+bool is_read_with(const LogTable& table, MappingDraft& draft) {
+  draft.refusal.clear();
+  try {
+    (void)measured_recordings(table, parse_mapping(draft.yaml(), "draft"));
+    return true;
+  } catch (const ClockError& error) {
+    draft.refusal = error.what();
+    return false;
+  } catch (const Error& error) {
+    draft.refusal = error.what();
+    return true;  // another clock does not help
+  }
+}
+
+}  // namespace
+
+std::string_view name(Certainty certainty) noexcept {
+  switch (certainty) {
+    case Certainty::none: return "";
+    case Certainty::unsure: return "unsure";
+    case Certainty::likely: return "likely";
+    case Certainty::sure: return "sure";
+  }
+  return "";
+}
+
+void ColumnGuess::add(Certainty at_most, std::string reason) {
+  certainty = std::min(certainty, at_most);
+  if (!reason.empty()) reasons.push_back(std::move(reason));
+}
+
+std::vector<double> DraftWork::si_values(std::size_t column) const {
+  const ColumnGuess& guess = draft.columns[column];
+  std::vector<double> si = values(column);
+  if (const Unit* const unit = find_unit(guess.unit); unit != nullptr)
+    for (double& value : si) value = guess.sign * unit->si(value);
+  return si;
+}
+
+std::vector<std::size_t> DraftWork::measured(Quantity quantity) const {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < size(); ++i)
+    if (readings[i].quantity == quantity && !readings[i].is_goal &&
+        !draft.columns[i].unit.empty() && draft.columns[i].is_written() &&
+        draft.columns[i].channel != "t_s")
+      found.push_back(i);
+  return found;
+}
+
+const ColumnGuess* MappingDraft::of(std::string_view channel) const {
+  const auto at = std::ranges::find_if(columns, [&](const ColumnGuess& guess) {
+    return guess.channel == channel && guess.is_written();
+  });
+  return at == columns.end() ? nullptr : &*at;
+}
+
+MappingDraft draft_mapping(const LogTable& table) {
+  require_numbers(table);
+  DraftWork work{.table = table, .draft = {.file = table.source.file}, .readings = {}};
+  for (ColumnSummary& summary : column_summaries(table)) {
+    work.readings.push_back(read_name(name_without_unit(summary)));
+    work.draft.columns.push_back({.summary = std::move(summary)});
+  }
+  work.draft.not_read = table.not_read;
+  work.draft.dropped = dropped_names(table);
+  guess_clock(work);
+  require_motion(table, work.draft);
+  guess_quantities(work);
+  guess_units(work);
+  guess_gear(work);
+  settle_twins(work);
+  guess_held(work);
+  if (work.draft.of("torque_Nm") == nullptr)
+    work.draft.remarks.emplace_back(
+        "no column is the torque of the spring (torque_Nm), the target of a model: name it, or "
+        "compute it from a known load (--load)");
+  if (work.draft.of("spring_deflection_rad") == nullptr &&
+      (work.draft.of("gear_angle_rad") == nullptr || work.draft.of("joint_angle_rad") == nullptr))
+    work.draft.remarks.emplace_back(
+        "no deflection: it follows from gear_angle_rad and joint_angle_rad, or name other inputs "
+        "with --inputs");
+  return std::move(work.draft);
+}
+
+void try_draft(const LogTable& table, MappingDraft& draft) {
+  draft.clock.clear();
+  if (is_read_with(table, draft)) return;
+  const std::string even = draft.refusal;
+  draft.clock = "{rebuild: true}";
+  draft.clock_reason = "the stamps are coarse or jitter: spread evenly";
+  if (is_read_with(table, draft)) return;
+  if (draft.rate_Hz > 0.0) {
+    draft.clock = fmt::format("{{resample: {:.4g}Hz}}", draft.rate_Hz);
+    draft.clock_reason = "the stamps are uneven: interpolated at their usual rate";
+    if (is_read_with(table, draft)) return;
+  }
+  draft.clock.clear();
+  draft.clock_reason.clear();
+  draft.refusal = even;
+}
+
+void answer(MappingDraft& draft, std::size_t column, std::string_view text) {
+  ColumnGuess& guess = draft.columns[column];
+  if (text.empty()) return;
+  if (text == "-") {
+    guess = {.summary = guess.summary, .reasons = {"left out by the user"}};
+    return;
+  }
+  const auto parts = split_channel_name(text);
+  const std::string place = fmt::format("'{}'", printable(guess.summary.name));
+  if (!parts)
+    throw UsageError({.place = place,
+                      .expected = "a channel with the unit of its numbers, such as joint_angle_deg",
+                      .found = fmt::format("'{}'", printable(text))});
+  const std::string channel = parts->si();
+  const ColumnGuess* const other = draft.of(channel);
+  if (other != nullptr && other != &guess)
+    throw UsageError({.place = place,
+                      .problem = fmt::format("{} is '{}' already", channel, other->summary.name)});
+  const bool is_same = channel == guess.channel;
+  guess.channel = channel;
+  guess.unit = parts->unit->suffix;
+  guess.missing.clear();
+  if (!is_same) guess.sign = guess.gear_ratio = 1.0;
+  guess.certainty = Certainty::sure;
+  guess.reasons.emplace_back("stated by the user");
+}
+
+}  // namespace torsio

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "data/log_summary.hpp"
+#include "data/log_table.hpp"
+
+namespace torsio {
+
+/// How sure a guess is.
+enum class Certainty : std::uint8_t {
+  none,    ///< no guess
+  unsure,  ///< one of several that the data allow: to be confirmed
+  likely,  ///< usual, and the data agree
+  sure     ///< stated in the file, or shown by the data
+};
+[[nodiscard]] std::string_view name(Certainty certainty) noexcept;
+
+/// What a column of a log is taken for.
+struct ColumnGuess {
+  ColumnSummary summary = {};
+  std::string channel = {};  ///< with its SI unit; empty: none
+  std::string unit = {};     ///< suffix of the unit of the numbers; empty: not known
+  double sign = 1.0;
+  double gear_ratio = 1.0;
+  bool holds = false;        ///< slower than the log
+  std::string missing = {};  ///< what the data do not show: the rule is only a comment
+  Certainty certainty = Certainty::none;
+  std::vector<std::string> reasons = {};  ///< "name: pos", "relation: 100.02 times 'joint'"
+
+  [[nodiscard]] bool is_written() const { return !channel.empty() && missing.empty(); }
+  void add(Certainty at_most, std::string reason);
+  /// The entry of `channels:`, "joint_angle_rad: {from: pos, unit: deg}".
+  [[nodiscard]] std::string rule() const;
+};
+
+/// A mapping that was guessed from names and values.
+struct MappingDraft {
+  std::string file = {};
+  std::vector<ColumnGuess> columns = {};   ///< as in the file
+  std::vector<std::string> not_read = {};  ///< columns that cannot be channels, with the reason
+  std::vector<std::string> dropped = {};   ///< names of those that must be left out
+  std::string clock = {};                  ///< the value of `clock:`; empty: the stamps are even
+  std::string clock_reason = {};
+  double rate_Hz = 0.0;  ///< rows in a second; 0: not known
+  std::vector<std::string> remarks = {};
+  std::string refusal = {};  ///< why a recording cannot be read with it yet; empty: it can
+
+  [[nodiscard]] const ColumnGuess* of(std::string_view channel) const;
+  [[nodiscard]] std::string yaml() const;
+};
+
+/// Guesses from a table that was read without mapping, with columns of texts left out.
+[[nodiscard]] MappingDraft draft_mapping(const LogTable& table);
+
+/// Reads the table with the draft, and adds what its clock needs, or why that does not work (`refusal`).
+void try_draft(const LogTable& table, MappingDraft& draft);
+
+/// A user's answer for a column: a channel with the unit of the numbers ("joint_angle_deg"), "-" for none, nothing for
+/// the guess as it is. @throws UsageError if it has no unit or another column is that channel.
+void answer(MappingDraft& draft, std::size_t column, std::string_view text);
+
+}  // namespace torsio
