@@ -247,6 +247,14 @@ AffineStage scale_stage(const Weights& scale, std::size_t width, const std::stri
 
 }  // namespace
 
+bool is_weights_json(std::span<const std::byte> bytes) noexcept {
+  const auto first = std::ranges::find_if_not(bytes, [](std::byte byte) {
+    return byte == std::byte{' '} || byte == std::byte{'\t'} || byte == std::byte{'\n'} ||
+           byte == std::byte{'\r'};
+  });
+  return first != bytes.end() && *first == std::byte{'{'};
+}
+
 ForeignNetwork parse_weights_json(std::span<const std::byte> bytes, std::string_view place,
                                   std::optional<Activation> activation) {
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes as the text that they are

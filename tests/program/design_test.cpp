@@ -50,7 +50,7 @@ TEST_F(DesignVerb, ComparesTheKindsOfSprings) {
   ASSERT_EQ(json.at("kinds").size(), 4U);
   for (const auto& kind : json.at("kinds")) {
     EXPECT_NE(table.out.find(kind.at("kind").get<std::string>()), std::string::npos);
-    if (kind.at("chosen")) EXPECT_EQ(kind.at("kind"), json.at("spring").at("kind"));
+    EXPECT_EQ(kind.at("chosen") == true, kind.at("kind") == json.at("spring").at("kind"));
   }
   EXPECT_NE(contents("a.html").find("Alternatives"), std::string::npos);
 }

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -37,15 +36,6 @@ struct ImportFlags {
 constexpr const char* kExample =
     "Example: torsio import anydrive.json --inputs \"joint_target_rad - joint_angle_rad, "
     "joint_speed_rad_s\" --rate 200Hz -o joint.safetensors";
-
-/// JSON starts with a brace; ONNX, a protobuf, with the number of a field.
-bool is_json(const std::vector<std::byte>& bytes) {
-  const auto first = std::ranges::find_if_not(bytes, [](std::byte byte) {
-    return byte == std::byte{' '} || byte == std::byte{'\t'} || byte == std::byte{'\n'} ||
-           byte == std::byte{'\r'};
-  });
-  return first != bytes.end() && *first == std::byte{'{'};
-}
 
 torsio::ForeignNetwork read_graph(const ImportFlags& flags,
                                   [[maybe_unused]] const torsio::ForeignFile& file) {
@@ -97,7 +87,7 @@ void run(ImportFlags& flags) {
   ProgressBar progress;
   const torsio::ForeignFile file = torsio::read_foreign_file(flags.file, progress.listener());
   const torsio::ForeignNetwork network =
-      is_json(file.bytes) ? read_weights(flags, file) : read_graph(flags, file);
+      torsio::is_weights_json(file.bytes) ? read_weights(flags, file) : read_graph(flags, file);
   std::optional<torsio::Dataset> guards;
   if (!flags.data.recordings.empty()) guards = flags.data.load({}, {}, progress.listener());
   torsio::ImportedModel imported =

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -18,7 +17,6 @@
 #include "supervision/monitor_simulated.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
-#include "torsio/files/model_file.hpp"
 #include "torsio/files/monitor_file.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "verbs.hpp"
@@ -115,18 +113,7 @@ std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
         fmt::format("the monitor is that of device {}; --device-serial checks that the recordings "
                     "are of it\n",
                     file.device_serial));
-  std::vector<ModelMapping> mappings;
-  const auto add = [&](const torsio::MonitoredModel& of) {
-    if (of.file.empty()) return;
-    const std::string model =
-        (std::filesystem::path(monitor_file).parent_path() / of.file).string();
-    mappings.push_back({model, torsio::load_model(model).card.mapping});
-  };
-  for (const torsio::MonitoredSource& source : file.models) {
-    add(source.torque);
-    add(source.friction);
-  }
-  use_common_mapping(flags.data, mappings);
+  use_common_mapping(flags.data, torsio::model_mappings(monitor_file));
   ProgressBar progress;
   const torsio::Dataset dataset =
       flags.data.load_inputs(monitored.raw_inputs(), progress.listener());

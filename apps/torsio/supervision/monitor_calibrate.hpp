@@ -5,6 +5,7 @@
 
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
+#include "evaluate/monitor/monitor_from_models.hpp"
 
 /// The flags of `torsio monitor --calibrate`.
 struct CalibrateFlags {
@@ -20,14 +21,9 @@ struct CalibrateFlags {
   std::string persistence;      ///< with unit; empty: that of the library
 };
 
-struct ModelMapping {
-  std::string file;
-  std::string mapping;  ///< `ModelCard::mapping`
-};
-
 /// Recordings are read with the mapping of the models, unless an option gives another.
 /// @throws torsio::Error if they were trained with different ones.
-void use_common_mapping(DataFlags& data, const std::vector<ModelMapping>& models);
+void use_common_mapping(DataFlags& data, const std::vector<torsio::ModelMapping>& models);
 
 /// Writes a monitor file from fault-free recordings.
 void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json);

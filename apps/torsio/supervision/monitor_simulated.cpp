@@ -12,8 +12,8 @@
 #include "core/quantity.hpp"
 #include "report/fault_campaign.hpp"
 #include "report/monitor.hpp"
-#include "sim/campaign/duty_recording.hpp"
 #include "sim/campaign/fused_accuracy.hpp"
+#include "sim/campaign/monitored_duty.hpp"
 #include "sim/campaign/simulated_monitor.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -77,23 +77,6 @@ torsio::DataSheet one_actuator(const SimulatedMonitorFlags& flags) {
   return torsio::find_data_sheet(flags.actuators.front());
 }
 
-/// The joint is at rest from its last larger motion on.
-torsio::MonitorReplay::Rest rest_after(const torsio::Recording& recording, double stop_s) {
-  constexpr double kStill_rad = 1e-3;
-  const std::vector<double>& angle = recording.channel("truth_joint_angle_rad").values;
-  const auto stop = std::min(
-      static_cast<std::size_t>(std::lround(stop_s * recording.sample_rate_Hz())), angle.size() - 1);
-  std::size_t last = stop;
-  for (std::size_t n = stop; n < angle.size(); ++n)
-    if (std::abs(angle[n] - angle.back()) > kStill_rad) last = n;
-  torsio::MonitorReplay::Rest rest{.moved_rad = std::abs(angle.back() - angle[stop])};
-  constexpr double kLeastRest_s = 0.05;
-  const double after_s = static_cast<double>(last - stop) / recording.sample_rate_Hz();
-  if (static_cast<double>(angle.size() - last) > kLeastRest_s * recording.sample_rate_Hz())
-    rest.after_s = after_s;
-  return rest;
-}
-
 /// Every actuator, as a specimen with tolerances; two springs with other friction than that of training.
 std::vector<std::string> actuators_of(const SimulatedMonitorFlags& flags) {
   if (!flags.actuators.empty()) return flags.actuators;
@@ -128,16 +111,8 @@ torsio::MonitorReplay replay_simulated(const SimulatedMonitorFlags& flags,
           ? monitored(flags, sheet)
           : torsio::load_monitor(monitor_file, {.serial = torsio::full_name(sheet)});
   settings = monitor.monitor().settings();
-  work.guard = &monitor;
-  work.with_truth = true;
   ProgressBar progress;
-  const torsio::Recording recording = torsio::duty_recording(sheet, work, progress.listener());
-  torsio::MonitorReplay replay = torsio::replay_monitor(monitor, recording, progress.listener());
-  for (const torsio::ScheduledFault& fault : work.faults.faults)
-    replay.injections.push_back(
-        {.fault = fmt::format("{} ({})", fault.what, fault.place), .start_s = fault.start_s});
-  if (!std::isnan(replay.stopped_at_s)) replay.rest = rest_after(recording, replay.stopped_at_s);
-  return replay;
+  return torsio::monitored_duty(sheet, std::move(work), monitor, progress.listener());
 }
 
 void run_campaign(const SimulatedMonitorFlags& flags, const JsonOutput& json) {

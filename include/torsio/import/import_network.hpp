@@ -61,6 +61,9 @@ struct ForeignNetwork {
   bool fold_biases = false;  ///< an LSTM's two biases into one
 };
 
+/// Whether bytes are JSON, which begins with a brace; ONNX, a protobuf, begins with the number of a field.
+[[nodiscard]] bool is_weights_json(std::span<const std::byte> bytes) noexcept;
+
 /// Reads the weights of a PyTorch network by tensor name, from untrusted JSON:
 ///
 ///     {"tensors": {"lstm.weight_ih_l0": {"shape": [32, 2], "data": [...]}, ...}}
