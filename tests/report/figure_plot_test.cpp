@@ -1,5 +1,6 @@
 #include "torsio/report/plot/figure_plot.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "report/plot/label_places.hpp"
 #include "support/error_message.hpp"
 
 namespace torsio {
@@ -172,6 +174,113 @@ TEST(FigurePlot, NamesWhatItCanDraw) {
   EXPECT_THAT(test::error_message([] { return plot_format("a.gif"); }),
               HasSubstr(".svg, .png or .pdf"));
   EXPECT_EQ(plot_format("A.PDF"), PlotFormat::pdf);
+}
+
+TEST(FigurePlot, DrawsEveryFigureThatAWordMatchesOnce) {
+  const ReportDocument document = example();
+  const auto figures = figures_of(document, {"over", "rate"});
+  ASSERT_EQ(figures.size(), 3U);
+  EXPECT_EQ(title_of(*figures[0]), "Torque over twist");
+  EXPECT_EQ(title_of(*figures[1]), "Residuals over rate");
+  EXPECT_EQ(title_of(*figures[2]), "Channels over time");
+}
+
+/// Errors and times of 13 models as `compare` draws them: most errors are within a factor of seven.
+XyFigure crowded_figure() {
+  XySeries models{.label = "models", .style = CurveStyle::points, .x = {}, .y = {}};
+  const std::vector<double> errors = {0.15, 0.27, 0.44, 0.74, 0.85, 0.86, 0.88,
+                                      0.89, 0.95, 0.97, 1.0,  1.06, 7.1};
+  const std::vector<double> times_ns = {160,   140, 130, 150, 121, 1262, 431,
+                                        16314, 290, 152, 120, 80,  441};
+  models.x = times_ns;
+  models.y = errors;
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    models.names.push_back(fmt::format("model_with_a_name_{}", i));
+  return {.title = "Error against the time of a step",
+          .x = {"median time of a step [ns]", true},
+          .y = {"RMSE [Nm]", true},
+          .series = {std::move(models)}};
+}
+
+TEST(FigurePlot, HasRoundTicksOnALogarithmicAxisOfFewDecades) {
+  const ReportFigure figure = crowded_figure();
+  const std::string svg = figure_plot({&figure}, PlotFormat::svg);
+  for (const char* tick : {"; 0.2;", "; 0.5;", "; 1;", "; 2;", "; 100;", "; 1000;", "; 10000;"})
+    EXPECT_THAT(svg, HasSubstr(tick));
+  XyFigure narrow = crowded_figure();
+  narrow.series[0].y.assign(narrow.series[0].y.size(), 1.1);
+  narrow.series[0].y[0] = 1.4;
+  const ReportFigure short_axis = narrow;
+  const std::string multiples = figure_plot({&short_axis}, PlotFormat::svg);
+  EXPECT_THAT(multiples, HasSubstr("; 1.2;"));
+  EXPECT_THAT(multiples, HasSubstr("; 1.3;"));
+}
+
+TEST(FigurePlot, WritesTheNamesOfColumnsAndOfValues) {
+  const ReportFigure columns = XyFigure{.title = "columns",
+                                        .x = {""},
+                                        .y = {"y"},
+                                        .series = {{.label = "a",
+                                                    .style = CurveStyle::columns,
+                                                    .x = {0.0, 1.0},
+                                                    .y = {1.0, 2.0},
+                                                    .names = {"first input", "second input"}}}};
+  TimeFigure time{.title = "t", .rate_Hz = 10.0, .samples = 4};
+  time.panels.push_back({.label = "fault_1",
+                         .series = {{.label = "a", .overview = {0.0F, 2.0F}, .detail = {}}},
+                         .value_names = {"none", "warming_up", "diverged"}});
+  const ReportFigure faults = time;
+  const std::string svg = figure_plot({&columns, &faults}, PlotFormat::svg);
+  for (const char* text : {"first input", "second input", "none", "diverged"})
+    EXPECT_THAT(svg, HasSubstr(text));
+  EXPECT_THAT(svg, Not(HasSubstr("warming_up"))) << "it does not occur";
+}
+
+bool do_boxes_overlap(const PlotArea& a, const PlotArea& b) {
+  return a.left < b.left + b.width && b.left < a.left + a.width && a.top < b.top + b.height &&
+         b.top < a.top + a.height;
+}
+
+TEST(FigurePlot, HasUnitsOfOneLengthOnEqualAxes) {
+  XyFigure figure{.title = "t",
+                  .x = {"x"},
+                  .y = {"y"},
+                  .series = {{.label = "a", .x = {-1.0, 1.0}, .y = {-0.1, 0.1}}}};
+  const ReportFigure own_ranges = figure;
+  figure.is_equal = true;
+  const ReportFigure equal = figure;
+  EXPECT_THAT(figure_plot({&own_ranges}, PlotFormat::svg), HasSubstr("; 0.1;"));
+  const std::string svg = figure_plot({&equal}, PlotFormat::svg);
+  EXPECT_THAT(svg, Not(HasSubstr("; 0.1;")));
+  EXPECT_THAT(svg, HasSubstr("; 0.5; "));
+}
+
+TEST(PlaceLabels, AreWithinTheAreaAndNotOverEachOther) {
+  const PlotArea area{.left = 20.0, .top = 10.0, .width = 200.0, .height = 110.0};
+  std::vector<PlotPoint> points;
+  for (int i = 0; i < 13; ++i)
+    points.push_back({area.left + 1.0 + 5.0 * i, area.top + 60.0 + 3.0 * (i % 3)});
+  const std::vector<LabelSize> sizes(points.size(), {.width = 50.0, .height = 8.0});
+  const auto places = place_labels(points, sizes, area, {{points.front(), points.back()}});
+  std::size_t placed = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (!places[i]) continue;
+    ++placed;
+    const PlotArea& box = places[i]->box;
+    EXPECT_GE(box.left, area.left);
+    EXPECT_LE(box.left + box.width, area.left + area.width);
+    EXPECT_GE(box.top, area.top);
+    EXPECT_LE(box.top + box.height, area.top + area.height);
+    for (std::size_t k = 0; k < i; ++k)
+      EXPECT_FALSE(places[k] && do_boxes_overlap(box, places[k]->box)) << i << " and " << k;
+  }
+  EXPECT_GE(placed, 12U);
+}
+
+TEST(PlaceLabels, HasNoPlaceForANameThatIsWiderThanTheArea) {
+  const PlotArea area{.left = 0.0, .top = 0.0, .width = 40.0, .height = 40.0};
+  const auto places = place_labels({{20.0, 20.0}}, {{.width = 50.0, .height = 8.0}}, area, {});
+  EXPECT_FALSE(places.front().has_value());
 }
 
 TEST(FigurePlot, ReadsASizeInMillimetres) {

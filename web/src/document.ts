@@ -56,6 +56,13 @@ export interface Mark {
   level: "warn" | "fail";
 }
 
+export interface TimePanel {
+  label: string;
+  series: TimeSeries[];
+  /** The names of the values 0, 1, ..: of faults and states. */
+  names?: string[];
+}
+
 export interface TimeFigure {
   kind: "time";
   id: string;
@@ -67,7 +74,7 @@ export interface TimeFigure {
   bucket: number;
   windows: Window[];
   marks: Mark[];
-  panels: { label: string; series: TimeSeries[] }[];
+  panels: TimePanel[];
   /** Low panels, for an overview of many. */
   compact?: boolean;
   /** It moves: thin lines with few points, which are drawn in a short time. */

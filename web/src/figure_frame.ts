@@ -23,6 +23,8 @@ export interface Frame {
   toolbar: HTMLElement;
   canvas: HTMLElement;
   note: HTMLElement;
+  /** The names of what is shaded below the pointer; hidden where nothing is. */
+  marks: HTMLElement;
 }
 
 /** The elements of a figure in the container that the page has for it. */
@@ -37,8 +39,11 @@ export function make_frame(place: HTMLElement, title: string): Frame {
   const note = document.createElement("p");
   note.className = "note";
   note.setAttribute("role", "status");
-  place.replaceChildren(toolbar, canvas, note);
-  return { toolbar, canvas, note };
+  const marks = document.createElement("p");
+  marks.className = "note marks";
+  marks.hidden = true;
+  place.replaceChildren(toolbar, canvas, note, marks);
+  return { toolbar, canvas, note, marks };
 }
 
 export function add_controls(frame: Frame, view: View): void {
@@ -82,23 +87,31 @@ export interface LegendEntry {
   shown: boolean;
 }
 
-/** A button for each series, pressed where the series is shown. */
-export function add_legend(frame: Frame, entries: LegendEntry[], toggle: (index: number, shown: boolean) => void): void {
+/** A box for each series, checked where the series is shown. @returns renames the entries */
+export function add_legend(
+  frame: Frame,
+  entries: LegendEntry[],
+  toggle: (index: number, shown: boolean) => void,
+): (name_of: (label: string) => string) => void {
   const legend = document.createElement("div");
   legend.className = "legend";
   legend.setAttribute("role", "group");
   legend.setAttribute("aria-label", "series");
-  entries.forEach((entry, index) => {
-    const button = add_button(legend, "", () => {
-      const shown = button.getAttribute("aria-pressed") !== "true";
-      button.setAttribute("aria-pressed", String(shown));
-      toggle(index, shown);
-    });
+  const names = entries.map((entry, index) => {
+    const label = document.createElement("label");
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = entry.shown;
+    box.addEventListener("change", () => toggle(index, box.checked));
     const swatch = document.createElement("span");
     swatch.className = "swatch";
     swatch.style.background = `var(${entry.colour})`;
-    button.append(swatch, entry.label);
-    button.setAttribute("aria-pressed", String(entry.shown));
+    const name = document.createElement("span");
+    name.textContent = entry.label;
+    label.append(box, swatch, name);
+    legend.append(label);
+    return name;
   });
   frame.toolbar.after(legend);
+  return (name_of) => names.forEach((name, index) => (name.textContent = name_of(entries[index].label)));
 }

@@ -1,4 +1,5 @@
 import "./report.css";
+import { add_angle_button, is_angle } from "./angles";
 import { read_report, slice } from "./document";
 import type { Figure, Report } from "./document";
 import { StoredSamples } from "./sample_source";
@@ -40,10 +41,17 @@ function draw_when_near(report: Report): void {
   addEventListener("beforeprint", () => [...waiting.keys()].forEach(draw_now));
 }
 
+function has_angles(figure: Figure): boolean {
+  if (figure.kind === "time") return figure.panels.some((panel) => is_angle(panel.label));
+  return is_angle(figure.x.label) || is_angle(figure.y.label);
+}
+
 document.documentElement.classList.add("with-script");
+const report = read_report();
+if (report.figures.some(has_angles)) add_angle_button();
 add_theme_button();
 document.querySelectorAll("table").forEach((table) => {
   make_rows_open(table);
   make_sortable(table);
 });
-draw_when_near(read_report());
+draw_when_near(report);

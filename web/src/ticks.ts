@@ -9,10 +9,30 @@ export function linear_ticks(low: number, high: number, most: number): number[] 
   return ticks;
 }
 
-export function log_ticks(low: number, high: number): number[] {
+/** The first digits of the ticks within each power of ten, from few ticks to many. */
+const kDigits = [[1], [1, 3], [1, 2, 5], [1, 2, 3, 5, 7], [1, 2, 3, 4, 5, 6, 7, 8, 9]];
+
+function ticks_with(digits: number[], low: number, high: number, every: number): number[] {
   const ticks = [];
-  for (let power = Math.ceil(Math.log10(low)); 10 ** power <= high * (1 + 1e-9); ++power) ticks.push(10 ** power);
-  return ticks.length > 1 ? ticks : linear_ticks(low, high, 4).filter((tick) => tick > 0);
+  const last = Math.floor(Math.log10(high));
+  for (let power = Math.floor(Math.log10(low)); power <= last; ++power) {
+    if (power % every !== 0) continue;
+    for (const digit of digits) {
+      const tick = Number(`${digit}e${power}`);
+      if (tick >= low * (1 - 1e-9) && tick <= high * (1 + 1e-9)) ticks.push(tick);
+    }
+  }
+  return ticks;
+}
+
+/** As many ticks as fit: powers of ten, or steps within them; on a short range multiples of a round number. */
+export function log_ticks(low: number, high: number, most: number): number[] {
+  const choices: (number[] | undefined)[] = kDigits.map((digits) => ticks_with(digits, low, high, 1)).filter((ticks) => ticks.length <= most);
+  const best = choices[choices.length - 1];
+  if (best && best.length >= 3) return best;
+  if (best) return linear_ticks(low, high, most).filter((tick) => tick > 0);
+  const every = Math.ceil(Math.log10(high / low) / most);
+  return ticks_with([1], low, high, every);
 }
 
 export function tick_text(value: number): string {

@@ -1,9 +1,11 @@
 import uPlot from "uplot";
-import type { Mark, TimeFigure, TimeSeries } from "./document";
+import { angle_factor, angle_text, on_angle_unit, scaled } from "./angles";
+import type { TimeFigure, TimePanel, TimeSeries } from "./document";
 import { add_controls, add_legend, make_frame } from "./figure_frame";
 import type { Frame, LegendEntry, View } from "./figure_frame";
 import type { SampleSource, Samples } from "./sample_source";
 import { css_colour, on_theme, series_colour, series_dash } from "./theme";
+import { draw_mark_names, draw_marks, draw_value_names, mark_names_at, named_values } from "./time_marks";
 
 const kFirstPanelHeight = 300;
 const kPanelHeight = 170;
@@ -12,8 +14,11 @@ const kCompactHeight = 110;
 const kWidths: Record<string, number> = { measured: 3, lower: 0.5, upper: 0.5 };
 const kMaxPoints = 2000;
 const kLiveWidth = 1;
+/** Part of a panel's height above and below values with names. */
+const kNameMargin = 0.35;
 
 interface Panel {
+  label: string;
   plot: uPlot;
   source: SampleSource;
   /** Whether the panel is on or near the screen: others are drawn when they come there. */
@@ -41,6 +46,7 @@ export class TimeView implements View {
     source_of: (series: TimeSeries[]) => SampleSource,
   ) {
     this.frame = make_frame(place, figure.title);
+    this.frame.marks.hidden = figure.marks.length === 0;
     const entries: (LegendEntry & { at: [panel: number, series: number][] })[] = [];
     const colours = new Map<string, number>();
     figure.panels.forEach((panel, p) => {
@@ -53,13 +59,13 @@ export class TimeView implements View {
       });
     });
     figure.panels.forEach((panel, p) => {
-      const plot = this.make_plot(panel.label, panel.series, colours, p);
-      this.panels.push({ plot, source: source_of(panel.series), is_near: true, drawn: null });
+      const plot = this.make_plot(panel, colours, p);
+      this.panels.push({ label: panel.label, plot, source: source_of(panel.series), is_near: true, drawn: null });
     });
     this.view = [this.begin_s, this.end_s];
     add_controls(this.frame, this);
     this.add_windows();
-    add_legend(this.frame, entries, (index, shown) => {
+    const rename = add_legend(this.frame, entries, (index, shown) => {
       for (const [panel, series] of entries[index].at) this.panels[panel].plot.setSeries(series, { show: shown });
       this.hide_empty_panels();
     });
@@ -68,6 +74,18 @@ export class TimeView implements View {
     this.watch_panels();
     new ResizeObserver(() => this.resize()).observe(this.frame.canvas);
     on_theme(() => this.panels.forEach(({ plot }) => plot.redraw(false)));
+    const use_angle_unit = () => {
+      rename(angle_text);
+      for (const panel of this.panels) {
+        panel.plot.axes[1].label = angle_text(panel.label);
+        panel.drawn = null;
+      }
+    };
+    on_angle_unit(() => {
+      use_angle_unit();
+      this.update();
+    });
+    use_angle_unit();
   }
 
   private get begin_s(): number {
@@ -123,8 +141,10 @@ export class TimeView implements View {
       panel.drawn = [begin, end];
       const samples = panel.source.range(begin, end, this.figure.live ? this.width() / 4 : kMaxPoints);
       shown = samples;
+      const factor = angle_factor(panel.label);
+      const values = samples.values.map((one) => with_gaps(scaled(one, factor)));
       panel.plot.batch(() => {
-        panel.plot.setData([samples.time_s, ...samples.values.map(with_gaps)] as unknown as uPlot.AlignedData, false);
+        panel.plot.setData([samples.time_s, ...values] as unknown as uPlot.AlignedData, false);
         panel.plot.setScale("x", { min: begin, max: end });
       });
     }
@@ -160,6 +180,13 @@ export class TimeView implements View {
     });
   }
 
+  /** The names of the ranges below the pointer. */
+  private note_marks(plot: uPlot): void {
+    const { left } = plot.cursor;
+    const names = left !== undefined && left >= 0 ? mark_names_at(plot, this.figure.marks, left) : "";
+    this.frame.marks.textContent = names;
+  }
+
   private height(index: number): number {
     if (this.figure.compact) return kCompactHeight;
     return index === 0 ? kFirstPanelHeight : kPanelHeight;
@@ -190,7 +217,7 @@ export class TimeView implements View {
     this.frame.toolbar.append(label);
   }
 
-  private make_plot(label: string, series: TimeSeries[], colours: Map<string, number>, index: number): uPlot {
+  private make_plot({ label, series, names }: TimePanel, colours: Map<string, number>, index: number): uPlot {
     const grid = () => css_colour("--grid");
     const text = () => css_colour("--text");
     const axis = { stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 } };
@@ -199,7 +226,7 @@ export class TimeView implements View {
       {
         width: this.width(),
         height: this.height(index),
-        scales: { x: { time: false, auto: false } },
+        scales: { x: { time: false, auto: false }, ...(names ? { y: { range: named_range } } : {}) },
         legend: { show: false },
         cursor: {
           drag: { x: true, y: false, setScale: false },
@@ -208,7 +235,7 @@ export class TimeView implements View {
         },
         axes: [
           { ...axis, label: is_last ? "time [s]" : undefined, size: is_last ? 40 : 28 },
-          { ...axis, label, size: 64 },
+          { ...axis, label, size: 64, ...(names ? named_axis(names) : {}) },
         ],
         series: [
           {},
@@ -224,6 +251,13 @@ export class TimeView implements View {
         bands: bands_of(series),
         hooks: {
           drawClear: [(plot: uPlot) => draw_marks(plot, this.figure.marks)],
+          draw: [
+            (plot: uPlot) => {
+              if (index === 0) draw_mark_names(plot, this.figure.marks);
+              if (names) draw_value_names(plot, names);
+            },
+          ],
+          setCursor: [(plot: uPlot) => this.note_marks(plot)],
           setSelect: [
             (plot: uPlot) => {
               if (plot.select.width < 4) return;
@@ -258,22 +292,20 @@ function colour_index(colours: Map<string, number>, series: TimeSeries): number 
   return colours.get(key) ?? 0;
 }
 
+/** An axis whose values have names in the panel instead of numbers beside it. */
+function named_axis(names: string[]): Partial<uPlot.Axis> {
+  return { splits: (plot) => named_values(plot, names), values: (_, splits) => splits.map(() => "") };
+}
+
+function named_range(_: uPlot, lowest: number, highest: number): uPlot.Range.MinMax {
+  const margin = kNameMargin * Math.max(highest - lowest, 1);
+  return [lowest - margin, highest + margin];
+}
+
 function bands_of(series: TimeSeries[]): uPlot.Band[] {
   const bands: uPlot.Band[] = [];
   series.forEach((one, index) => {
     if (one.role === "upper") bands.push({ series: [index + 1, index], fill: () => css_colour("--band") });
   });
   return bands;
-}
-
-/** Guards, faults and findings as shaded ranges of time. */
-function draw_marks(plot: uPlot, marks: Mark[]): void {
-  const { left, top, width, height } = plot.bbox;
-  for (const mark of marks) {
-    const begin = Math.max(plot.valToPos(mark.begin_s, "x", true), left);
-    const end = Math.min(plot.valToPos(mark.end_s, "x", true), left + width);
-    if (!(end >= begin)) continue;
-    plot.ctx.fillStyle = css_colour(mark.level === "fail" ? "--fail-area" : "--warn-area");
-    plot.ctx.fillRect(begin, top, Math.max(end - begin, 2), height);
-  }
 }

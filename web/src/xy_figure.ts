@@ -1,36 +1,22 @@
-import type { Numbers, XyFigure, XySeries } from "./document";
+import { angle_factor, angle_text, on_angle_unit, scaled } from "./angles";
+import type { Numbers, XyFigure } from "./document";
 import { add_controls, add_legend, make_frame } from "./figure_frame";
 import type { Frame, View } from "./figure_frame";
+import type { Box } from "./label_places";
 import { Scale, scale_of } from "./scale";
-import { on_theme, scale_colour, series_colour, series_dash } from "./theme";
+import { element, kLineHeight, kNamespace, text_width } from "./svg_elements";
+import { on_theme, series_colour, series_dash } from "./theme";
 import { linear_ticks, log_ticks, tick_text } from "./ticks";
+import { column_step, draw_point_names, draw_series } from "./xy_series";
+import type { Drawn, Plane } from "./xy_series";
 
-const kNamespace = "http://www.w3.org/2000/svg";
 const kLeft = 64;
 const kRight = 12;
 const kTop = 8;
 const kBottom = 44;
-const kColourBins = 5;
-
-interface Drawn {
-  series: XySeries;
-  x: Float32Array;
-  y: Float32Array;
-  colour: Float32Array | null;
-  shown: boolean;
-  css: string;
-  dash: number[];
-}
-
-function element(parent: Element, name: string, attributes: Record<string, string | number>): SVGElement {
-  const made = document.createElementNS(kNamespace, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
-  parent.append(made);
-  return made;
-}
 
 /** Loops, scatter, columns and Bode diagrams: any x, in SVG, so that printing and zooming stay sharp. */
-export class XyView implements View {
+export class XyView implements View, Plane {
   private readonly frame: Frame;
   private readonly drawn: Drawn[];
   private readonly svg: SVGSVGElement;
@@ -38,7 +24,10 @@ export class XyView implements View {
   private y!: Scale;
   private width = 0;
   private height = 0;
+  /** Below the area: numbers or names, and the label of the axis. */
+  private bottom = kBottom;
   private is_fitted = true;
+  private is_waiting = false;
 
   /** @param numbers_of the numbers of a series */
   constructor(
@@ -50,10 +39,12 @@ export class XyView implements View {
     let models = 0;
     this.drawn = figure.series.map((series) => {
       const index = series.role === "model" ? models++ : 0;
+      const stored: Drawn["stored"] = [numbers_of(series.x), numbers_of(series.y)];
       return {
         series,
-        x: numbers_of(series.x),
-        y: numbers_of(series.y),
+        stored,
+        x: stored[0],
+        y: stored[1],
         colour: series.colour ? numbers_of(series.colour) : null,
         shown: series.shown,
         css: series_colour(series.role, index),
@@ -65,34 +56,45 @@ export class XyView implements View {
     this.svg.setAttribute("aria-label", figure.title);
     this.frame.canvas.append(this.svg);
     add_controls(this.frame, this);
-    if (this.drawn.length > 1)
-      add_legend(
-        this.frame,
-        this.drawn.map((one) => ({ label: one.series.label, colour: one.css, shown: one.shown })),
-        (index, shown) => {
-          this.drawn[index].shown = shown;
-          this.draw();
-        },
-      );
-    this.fit();
+    const rename =
+      this.drawn.length > 1
+        ? add_legend(
+            this.frame,
+            this.drawn.map((one) => ({ label: one.series.label, colour: one.css, shown: one.shown })),
+            (index, shown) => {
+              this.drawn[index].shown = shown;
+              this.draw();
+            },
+          )
+        : () => {};
+    const use_unit = () => {
+      rename(angle_text);
+      this.use_angle_unit();
+    };
+    use_unit();
+    this.reset();
     this.drag_to_zoom();
     new ResizeObserver(() => {
       if (this.frame.canvas.clientWidth !== this.width) this.draw();
     }).observe(this.frame.canvas);
     on_theme(() => this.draw());
+    on_angle_unit(() => {
+      use_unit();
+      this.reset();
+    });
   }
 
   zoom(factor: number): void {
     this.is_fitted = false;
     this.x.zoom(factor);
     this.y.zoom(factor);
-    this.draw();
+    this.draw_soon();
   }
   pan(right: number, up: number): void {
     this.is_fitted = false;
     this.x.pan(right);
     this.y.pan(up);
-    this.draw();
+    this.draw_soon();
   }
   reset(): void {
     this.is_fitted = true;
@@ -101,19 +103,42 @@ export class XyView implements View {
   }
   /** Replaces the points of all series; the axes contain all points unless a person has zoomed. */
   replace(points: [x: Float32Array, y: Float32Array][]): void {
-    points.forEach(([x, y], index) => Object.assign(this.drawn[index], { x, y }));
+    points.forEach((stored, index) => (this.drawn[index].stored = stored));
+    this.use_angle_unit();
     if (this.is_fitted) this.fit();
     this.draw();
+  }
+
+  private use_angle_unit(): void {
+    const { x, y } = this.figure;
+    for (const one of this.drawn) {
+      one.x = scaled(one.stored[0], angle_factor(x.label));
+      one.y = scaled(one.stored[1], angle_factor(y.label));
+    }
   }
 
   private fit(): void {
     const shown = this.drawn.filter((one) => one.shown);
     const fitted = shown.length > 0 ? shown : this.drawn;
-    const has_columns = fitted.some((one) => one.series.style === "columns");
-    this.x = scale_of(fitted.map((one) => one.x), this.figure.x.log, has_columns ? 0.06 : 0.04);
+    const columns = fitted.filter((one) => one.series.style === "columns");
+    const ends = columns.map(({ x }) => {
+      const half = 0.5 * column_step(x);
+      return new Float32Array([x[0] - half, x[x.length - 1] + half]);
+    });
+    this.x = scale_of([...fitted.map((one) => one.x), ...ends], this.figure.x.log, columns.length > 0 ? 0.01 : 0.04);
     const heights = fitted.map((one) => one.y);
-    if (has_columns) heights.push(new Float32Array([0]));
+    if (columns.length > 0) heights.push(new Float32Array([0]));
     this.y = scale_of(heights, this.figure.y.log);
+  }
+
+  /** Once for all events of a frame. */
+  private draw_soon(): void {
+    if (this.is_waiting) return;
+    this.is_waiting = true;
+    requestAnimationFrame(() => {
+      this.is_waiting = false;
+      this.draw();
+    });
   }
 
   private drag_to_zoom(): void {
@@ -159,25 +184,27 @@ export class XyView implements View {
     return (pixel - kLeft) / (this.width - kLeft - kRight);
   }
   private share_y(pixel: number): number {
-    return 1 - (pixel - kTop) / (this.height - kTop - kBottom);
+    return 1 - (pixel - kTop) / (this.height - kTop - this.bottom);
   }
-  private pixel_x(value: number): number {
+  pixel_x(value: number): number {
     return kLeft + this.x.share(value) * (this.width - kLeft - kRight);
   }
-  private pixel_y(value: number): number {
-    return kTop + (1 - this.y.share(value)) * (this.height - kTop - kBottom);
+  pixel_y(value: number): number {
+    return kTop + (1 - this.y.share(value)) * (this.height - kTop - this.bottom);
   }
 
   private show_position(x: number, y: number): void {
     const values = [this.x.value(this.share_x(x)), this.y.value(this.share_y(y))];
     this.frame.note.textContent =
-      `${this.figure.x.label} ${values[0].toPrecision(4)}, ${this.figure.y.label} ${values[1].toPrecision(4)}` +
+      `${angle_text(this.figure.x.label)} ${values[0].toPrecision(4)}, ` +
+      `${angle_text(this.figure.y.label)} ${values[1].toPrecision(4)}` +
       (this.figure.colour_label ? `. Colour: ${this.figure.colour_label}` : "");
   }
 
   private draw(): void {
     this.width = Math.max(this.frame.canvas.clientWidth, 280);
     this.height = Math.round(Math.min(Math.max(0.6 * this.width, 240), 440));
+    this.bottom = kBottom + (this.name_rows() - 1) * kLineHeight;
     if (this.figure.equal) this.make_equal();
     this.svg.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
     this.svg.setAttribute("width", String(this.width));
@@ -186,37 +213,67 @@ export class XyView implements View {
     this.draw_axes();
     const clip = `clip-${this.figure.id}`;
     const path = element(element(this.svg, "defs", {}), "clipPath", { id: clip });
-    const area = { x: kLeft, y: kTop, width: this.width - kLeft - kRight, height: this.height - kTop - kBottom };
-    element(path, "rect", area);
+    const { left: x, top: y, width, height } = this.area();
+    element(path, "rect", { x, y, width, height });
     const layer = element(this.svg, "g", { "clip-path": `url(#${clip})` });
-    for (const one of this.drawn) if (one.shown) this.draw_series(layer, one);
+    for (const one of this.drawn) if (one.shown) draw_series(this, layer, one);
+    draw_point_names(this, layer, this.drawn);
+  }
+
+  area(): Box {
+    return { left: kLeft, top: kTop, width: this.width - kLeft - kRight, height: this.height - kTop - this.bottom };
+  }
+
+  /** The names below the columns. */
+  private column_names(): string[] | undefined {
+    return this.drawn.find((one) => one.series.style === "columns" && one.series.names)?.series.names;
+  }
+
+  /** Rows for the names below the columns, so that neighbours do not overlap. */
+  private name_rows(): number {
+    const names = this.column_names();
+    if (!names) return 1;
+    const step = this.pixel_x(1) - this.pixel_x(0);
+    const widest = Math.max(...names.map((name) => text_width(name)));
+    return Math.min(Math.max(Math.ceil((widest + 8) / step), 1), names.length);
   }
 
   private make_equal(): void {
     const per_pixel = (scale: Scale, pixels: number) => (scale.high - scale.low) / pixels;
     const x = per_pixel(this.x, this.width - kLeft - kRight);
-    const y = per_pixel(this.y, this.height - kTop - kBottom);
+    const y = per_pixel(this.y, this.height - kTop - this.bottom);
     if (x < y) this.x.zoom(y / x);
     else this.y.zoom(x / y);
   }
 
+  /** Below the area and within the figure. */
+  private write_below(at: number, row: number, text: string): void {
+    const half = 0.5 * text_width(text);
+    const x = Math.max(Math.min(at, this.width - half - 2), half + 2);
+    const y = this.height - this.bottom + 16 + row * kLineHeight;
+    element(this.svg, "text", { x, y, class: "tick middle" }).textContent = text;
+  }
+
   private draw_axes(): void {
     const { figure } = this;
-    const bottom = this.height - kBottom;
+    const bottom = this.height - this.bottom;
     const right = this.width - kRight;
+    const columns = Math.max(this.width / 90, 3);
     const x_ticks = figure.x.log
-      ? log_ticks(this.x.low, this.x.high)
-      : linear_ticks(this.x.low, this.x.high, Math.max(this.width / 90, 3));
-    const y_ticks = figure.y.log ? log_ticks(this.y.low, this.y.high) : linear_ticks(this.y.low, this.y.high, 6);
-    const names = this.drawn.find((one) => one.series.style === "columns" && one.series.names)?.series.names;
+      ? log_ticks(this.x.low, this.x.high, columns)
+      : linear_ticks(this.x.low, this.x.high, columns);
+    const y_ticks = figure.y.log ? log_ticks(this.y.low, this.y.high, 9) : linear_ticks(this.y.low, this.y.high, 6);
+    const names = this.column_names();
     for (const tick of x_ticks) {
       const x = this.pixel_x(tick);
       element(this.svg, "line", { x1: x, x2: x, y1: kTop, y2: bottom, class: "grid" });
-      if (!names)
-        element(this.svg, "text", { x, y: bottom + 16, class: "tick middle" }).textContent = tick_text(tick);
+      if (!names) this.write_below(x, 0, tick_text(tick));
     }
+    const rows = this.name_rows();
     names?.forEach((name, column) => {
-      element(this.svg, "text", { x: this.pixel_x(column), y: bottom + 16, class: "tick middle" }).textContent = name;
+      const at = this.pixel_x(column);
+      if (at < kLeft || at > right) return;
+      this.write_below(at, column % rows, name);
     });
     for (const tick of y_ticks) {
       const y = this.pixel_y(tick);
@@ -227,82 +284,13 @@ export class XyView implements View {
       x: 0.5 * (kLeft + right),
       y: this.height - 8,
       class: "label middle",
-    }).textContent = figure.x.label;
+    }).textContent = angle_text(figure.x.label);
     const middle = 0.5 * (kTop + bottom);
     element(this.svg, "text", {
       x: 14,
       y: middle,
       transform: `rotate(-90 14 ${middle})`,
       class: "label middle",
-    }).textContent = figure.y.label;
-  }
-
-  private draw_series(layer: Element, one: Drawn): void {
-    const { style } = one.series;
-    if (style === "columns") return this.draw_columns(layer, one);
-    const colours = one.colour ? kColourBins : 1;
-    const range = one.colour ? scale_of([one.colour], false, 0) : null;
-    const bin_of = (i: number) => {
-      if (!one.colour || !range) return 0;
-      const share = range.share(one.colour[i]);
-      return Number.isFinite(share) ? Math.min(Math.max(Math.floor(share * colours), 0), colours - 1) : 0;
-    };
-    const paths: string[] = new Array<string>(colours).fill("");
-    let pen = -1;
-    for (let i = 0; i < one.x.length; ++i) {
-      const [x, y] = [this.pixel_x(one.x[i]), this.pixel_y(one.y[i])];
-      const bin = bin_of(i);
-      if (!Number.isFinite(x) || !Number.isFinite(y)) {
-        pen = -1;
-        continue;
-      }
-      const point = `${x.toFixed(1)} ${y.toFixed(1)}`;
-      if (style === "points") paths[bin] += `M${point}h0`;
-      else if (pen < 0) paths[bin] += `M${point}`;
-      else paths[pen] += `L${point}`;
-      if (style === "line" && pen >= 0 && pen !== bin) paths[bin] += `M${point}`;
-      pen = bin;
-    }
-    paths.forEach((d, bin) => {
-      if (d === "") return;
-      const stroke = one.colour ? scale_colour(bin / colours) : `var(${one.css})`;
-      const path = element(layer, "path", { d, class: style === "points" ? "dots" : "curve" });
-      path.style.stroke = stroke;
-      // It can be seen below the model that follows it.
-      if (style === "line" && one.series.role === "measured") path.style.strokeWidth = "3";
-      if (one.dash.length > 0 && style === "line") path.style.strokeDasharray = one.dash.join(" ");
-    });
-    if (style === "points") this.name_points(layer, one);
-  }
-
-  private name_points(layer: Element, one: Drawn): void {
-    one.series.names?.forEach((name, i) => {
-      const x = this.pixel_x(one.x[i]);
-      if (!Number.isFinite(x)) return;
-      const is_right = x > 0.75 * this.width;
-      element(layer, "text", {
-        x: x + (is_right ? -6 : 6),
-        y: this.pixel_y(one.y[i]) - 5,
-        class: is_right ? "tick end" : "tick",
-      }).textContent = name;
-    });
-  }
-
-  private draw_columns(layer: Element, one: Drawn): void {
-    const step = one.x.length > 1 ? Math.abs(one.x[1] - one.x[0]) : 1;
-    const width = Math.max(0.85 * Math.abs(this.pixel_x(step) - this.pixel_x(0)), 1);
-    const zero = this.pixel_y(0);
-    for (let i = 0; i < one.x.length; ++i) {
-      const y = this.pixel_y(one.y[i]);
-      if (!Number.isFinite(y)) continue;
-      const column = element(layer, "rect", {
-        x: this.pixel_x(one.x[i]) - width / 2,
-        y: Math.min(y, zero),
-        width,
-        height: Math.abs(zero - y),
-        class: "column",
-      });
-      column.style.fill = `var(${one.css})`;
-    }
+    }).textContent = angle_text(figure.y.label);
   }
 }

@@ -1,14 +1,21 @@
-// node browser.mjs REPORTS [PICTURES]: opens every report of a folder in headless Chromium and uses it as a person
-// does, in both themes. Writes a picture of each theme if a folder is named. CHROMIUM: the browser's program.
+// node browser.mjs REPORTS [--pictures FOLDER] [--compare FOLDER --differences FOLDER]: opens every report of a folder in
+// headless Chromium and uses it as a person does, in both themes. --pictures writes a picture of each theme; --compare
+// compares them with those of a folder and writes what differs. CHROMIUM: the browser's program.
 import { readdirSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join, resolve } from "node:path";
+import { parseArgs } from "node:util";
 import { chromium } from "playwright-core";
+import { check_angles, check_frame_rate, check_names, check_nothing_is_cut } from "./page_checks.mjs";
+import { compare_pictures, take_picture } from "./pictures.mjs";
 
-const [reports, pictures] = process.argv.slice(2);
+const { positionals, values: options } = parseArgs({
+  allowPositionals: true,
+  options: { pictures: { type: "string" }, compare: { type: "string" }, differences: { type: "string" } },
+});
+const [reports] = positionals;
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const kMaxMilliseconds = 1500;
-const kPicture = { width: 900, height: 1500 };
 const problems = [];
 
 function expect(condition, what) {
@@ -53,19 +60,25 @@ async function check_xy_figure(page, name) {
   const ticks = () => svg.locator("text.tick").allTextContents();
   const before = await ticks();
   await figure.getByRole("button", { name: "Zoom in" }).click();
+  await page.waitForTimeout(60);
   expect(String(await ticks()) !== String(before), `${name}: Zoom in does not change the axes`);
   await figure.getByRole("button", { name: "Show all" }).click();
   expect(String(await ticks()) === String(before), `${name}: Show all does not restore the axes`);
-  const series = figure.locator(".legend button").first();
+  const series = figure.locator(".legend input").first();
   if ((await series.count()) === 0) return;
   const curves = () => svg.locator("path.curve, path.dots, rect.column").count();
   const shown = await curves();
+  const was_checked = await series.isChecked();
   await series.focus();
-  await page.keyboard.press("Enter");
-  expect((await curves()) !== shown, `${name}: a legend's button does not hide its series`);
-  expect((await series.getAttribute("aria-pressed")) === "false", `${name}: a legend's button stays pressed`);
-  await page.keyboard.press("Enter");
-  expect((await curves()) === shown, `${name}: a legend's button does not show its series again`);
+  await page.keyboard.press("Space");
+  expect((await curves()) !== shown, `${name}: a box of the legend does not hide its series`);
+  expect((await series.isChecked()) !== was_checked, `${name}: a box of the legend stays as it is`);
+  await page.keyboard.press("Space");
+  expect((await curves()) === shown, `${name}: a box of the legend does not show its series again`);
+  const struck = await figure.locator(".legend *").evaluateAll(
+    (parts) => parts.filter((part) => getComputedStyle(part).textDecorationLine.includes("line-through")).length,
+  );
+  expect(struck === 0, `${name}: ${struck} entries of a legend are struck out`);
 }
 
 async function check_table(page, name) {
@@ -106,24 +119,9 @@ async function panning_rate(page) {
   });
 }
 
-/** The page from its beginning to the end of the first time series, or of the first figures. */
-async function take_picture(page, path) {
-  const size = page.viewportSize();
-  await page.setViewportSize(kPicture);
-  await page.waitForTimeout(300);  // figures are drawn when they come near the screen
-  const end = await page.evaluate(() => {
-    const figures = [...document.querySelectorAll("figure")];
-    const last = figures.find((figure) => figure.querySelector(".uplot")) ?? figures[0];
-    return last ? last.getBoundingClientRect().bottom : innerHeight;
-  });
-  const clip = { x: 0, y: 0, width: kPicture.width, height: Math.min(Math.ceil(end) + 16, kPicture.height) };
-  await page.screenshot({ path, clip, animations: "disabled" });
-  await page.setViewportSize(size);
-}
-
 async function check_report(browser, file, theme) {
   const name = `${file} (${theme})`;
-  const context = await browser.newContext({ colorScheme: theme, viewport: { width: 1100, height: 900 } });
+  const context = await browser.newContext({ colorScheme: theme, viewport: { width: 1280, height: 900 } });
   const page = await context.newPage();
   page.on("console", (message) => {
     if (message.type() === "error") problems.push(`${name}: console: ${message.text()}`);
@@ -136,11 +134,18 @@ async function check_report(browser, file, theme) {
   await page.goto("file://" + resolve(join(reports, file)));
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   const opened_ms = performance.now() - start;
-  if (pictures) await take_picture(page, join(pictures, `${file.replace(".html", "")}-${theme}.png`));
+  const picture = `${file.replace(".html", "")}-${theme}.png`;
+  if (options.pictures) await take_picture(page, join(options.pictures, picture));
+  if (options.compare)
+    problems.push(...(await compare_pictures(page, join(options.compare, picture), join(options.differences, picture))));
+  problems.push(...(await check_nothing_is_cut(page, name)));
+  problems.push(...(await check_names(page, name)));
+  problems.push(...(await check_angles(page, name)));
   await check_table(page, name);
   await check_xy_figure(page, name);
   await check_time_figure(page, name);
   const rate = await panning_rate(page);
+  if (file === "compare.html") problems.push(...(await check_frame_rate(page, name)));
   await page.evaluate(() => scrollTo(0, 0));
   await page.evaluate(axe);
   const { violations } = await page.evaluate(() => window.axe.run());
@@ -156,6 +161,7 @@ async function check_report(browser, file, theme) {
   expect(narrow, `${name}: the page is wider than the window`);
   await page.setViewportSize({ width: 380, height: 700 });
   await page.waitForTimeout(100);
+  problems.push(...(await check_nothing_is_cut(page, `${name}, on a phone`, true)));
   const phone = await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth + 1);
   expect(phone, `${name}: the page is wider than a phone`);
   expect(opened_ms < kMaxMilliseconds, `${name}: opens in ${opened_ms.toFixed(0)} ms`);

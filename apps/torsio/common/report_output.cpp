@@ -73,8 +73,9 @@ void ReportOutput::add(CLI::App& verb, std::string preferred) {
       verb.add_option("--plot", plot, "draw a figure of the page for a paper: SVG, PNG or PDF")
           ->option_text("FILE")
           ->check([](const std::string& path) { return problem_of(torsio::plot_format, path); });
-  verb.add_option("--plot-figure", plot_figures,
-                  "figures to draw, under each other: words of their titles, separated by commas")
+  verb.add_option(
+          "--plot-figure", plot_figures,
+          "all figures with one of these words in their titles, under each other: WORD,WORD")
       ->option_text("WORDS")
       ->delimiter(',')
       ->needs(picture);

@@ -99,6 +99,7 @@ class FigureWriter {
                           {"overview", numbers(one.overview)},
                           {"detail", numbers(one.detail)}});
       json["panels"].push_back({{"label", panel.label}, {"series", std::move(series)}});
+      if (!panel.value_names.empty()) json["panels"].back()["names"] = panel.value_names;
     }
     return json;
   }

@@ -2,21 +2,27 @@
 
 #include <cairo.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
+#include "report/plot/label_places.hpp"
 #include "report/plot/plot_axis.hpp"
 #include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 
-/// A part of a picture, in points of 1/72 inch.
-struct PlotArea {
-  double left = 0.0;
-  double top = 0.0;
-  double width = 0.0;
-  double height = 0.0;
+/// Lengths of a picture, in points.
+struct PlotLengths {
+  static constexpr double text = 7.0;
+  static constexpr double line_height = 9.5;
+  static constexpr double bottom = 24.0;  ///< for the numbers and the label of the horizontal axis
 };
+
+/// Cairo writes a coordinate of SVG with up to six digits; of a sixteenth these are at most four.
+[[nodiscard]] inline double rounded_position(double position) {
+  return std::round(16.0 * position) / 16.0;
+}
 
 /// Draws figures with cairo.
 class FigurePainter {
@@ -40,6 +46,7 @@ class FigurePainter {
     std::string label;
     CurveRole role = CurveRole::model;
     std::size_t index = 0;
+    CurveStyle style = CurveStyle::line;
   };
   enum class Align : std::uint8_t { begin, middle, end };
 
@@ -57,9 +64,18 @@ class FigurePainter {
   void line(const std::vector<double>& x, const std::vector<double>& y, const PlotAxis& x_axis,
             const PlotAxis& y_axis);
   void points(const XySeries& series, const PlotAxis& x, const PlotAxis& y);
+  void point_names(const XyFigure& figure, const PlotAxis& x, const PlotAxis& y,
+                   const PlotArea& frame);
+  /// The names below the columns, in rows so that they do not overlap.
+  void column_names(const XySeries& series, const PlotAxis& x, const PlotArea& frame,
+                    std::size_t rows);
+  [[nodiscard]] std::size_t name_rows(const XySeries* series, double width) const;
   void columns(const XySeries& series, const PlotAxis& x, const PlotAxis& y);
   /// Shades from blue to red with the values of both ends. @returns its height
   double colour_scale(const FieldFigure& figure, double left, double top);
+  /// Names of faults and states, above their values.
+  void value_names(const TimeFigure::Panel& panel, const std::vector<std::vector<double>>& values,
+                   const PlotAxis& y, const PlotArea& frame);
   void panel(const TimeFigure& figure, const TimeFigure::Panel& panel,
              const std::vector<LegendEntry>& entries, const PlotAxis& x, const PlotArea& frame,
              bool is_last);

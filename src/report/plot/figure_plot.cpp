@@ -163,22 +163,23 @@ std::vector<const ReportFigure*> figures_of(const ReportDocument& document,
     for (const ReportFigure& figure : section.figures) all.push_back(&figure);
   if (all.empty())
     throw UsageError({.place = "--plot", .problem = "this result has no figure to draw"});
-  const auto containing = [&](std::string_view word) {
-    return std::ranges::find_if(all, [&](const ReportFigure* figure) {
-      return lower(title_of(*figure)).find(lower(word)) != std::string::npos;
-    });
+  const auto contains = [](const ReportFigure* figure, std::string_view word) {
+    return lower(title_of(*figure)).find(lower(word)) != std::string::npos;
   };
   if (words.empty()) {
-    const auto found = containing(preferred);
+    const auto found = std::ranges::find_if(
+        all, [&](const ReportFigure* figure) { return contains(figure, preferred); });
     return {found == all.end() ? all.front() : *found};
   }
   std::vector<const ReportFigure*> chosen;
   for (const std::string& word : words) {
-    const auto found = containing(word);
-    if (found != all.end()) {
-      chosen.push_back(*found);
-      continue;
+    bool is_found = false;
+    for (const ReportFigure* figure : all) {
+      if (!contains(figure, word)) continue;
+      is_found = true;
+      if (std::ranges::find(chosen, figure) == chosen.end()) chosen.push_back(figure);
     }
+    if (is_found) continue;
     std::vector<std::string> titles;
     titles.reserve(all.size());
     for (const ReportFigure* figure : all) titles.push_back("'" + title_of(*figure) + "'");

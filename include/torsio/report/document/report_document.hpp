@@ -81,6 +81,7 @@ struct TimeFigure {
   struct Panel {
     std::string label;
     std::vector<TimeSeries> series;
+    std::vector<std::string> value_names = {};  ///< names of the values 0, 1, ..: faults, states
   };
   std::string title;
   double start_s = 0.0;

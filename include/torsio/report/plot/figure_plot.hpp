@@ -32,8 +32,8 @@ inline constexpr std::size_t kMaxPlotBytes = 200'000;
 
 [[nodiscard]] const std::string& title_of(const ReportFigure& figure);
 
-/// The figures of a document whose titles contain one of the words, in the order of the words; letters' case does not
-/// matter. Without words the first figure, or the first whose title contains `preferred`.
+/// All figures of a document whose titles contain one of the words, each once, in the order of the words; letters' case
+/// does not matter. Without words the first figure, or the first whose title contains `preferred`.
 /// @throws UsageError with the list of the titles if a word is in none, or the document has no figure.
 [[nodiscard]] std::vector<const ReportFigure*> figures_of(const ReportDocument& document,
                                                           const std::vector<std::string>& words,
