@@ -4,15 +4,18 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/data/load.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/fit/common/family_info.hpp"
 
@@ -32,14 +35,31 @@ struct Model {
 inline constexpr int kPickleVersion = 1;
 void check_pickle(const py::tuple& state, std::size_t size, std::string_view what);
 
-/// Runs `work(progress)` without the interpreter's lock. Ctrl-C, and whatever else a handler of a signal
-/// raises, stops the work and is raised afterwards.
+/// The function of (fraction, text) that `torsio.progress` has set in this thread; null: none.
+[[nodiscard]] py::object progress_listener();
+
+/// Calls the listener with the interpreter's lock, at most every 0.1 s.
+class ProgressCalls {
+ public:
+  explicit ProgressCalls(py::object listener) : listener_(std::move(listener)) {}
+  /// What the listener raised; none: nothing.
+  [[nodiscard]] std::optional<py::error_already_set> call(double fraction, std::string_view doing);
+
+ private:
+  py::object listener_;
+  std::chrono::steady_clock::time_point next_ = {};
+};
+
+/// Runs `work(progress)` without the interpreter's lock. Ctrl-C, and whatever else a handler of a signal or
+/// the listener of the progress raises, stops the work and is raised afterwards.
 template <class Work>
 auto interruptible(const Work& work) {
   std::optional<py::error_already_set> raised;
-  const Progress progress = [&raised](double /*fraction*/, std::string_view /*doing*/) {
+  ProgressCalls calls(progress_listener());
+  const Progress progress = [&raised, &calls](double fraction, std::string_view doing) {
     const py::gil_scoped_acquire lock;
     if (!raised && PyErr_CheckSignals() != 0) raised.emplace();
+    if (!raised) raised = calls.call(fraction, doing);
     return !raised.has_value();
   };
   try {
@@ -61,7 +81,14 @@ auto interruptible(const Work& work) {
 /// "an array of shape (3, 2)", "a str": for messages.
 [[nodiscard]] std::string kind_of(const py::handle& object);
 
+/// Recordings, paths of logs or manifests, or lists of those.
+[[nodiscard]] std::vector<Recording> recordings_from(const py::object& items,
+                                                     const LoadOptions& options = {});
+
 void bind_errors(py::module_& module);
+void bind_progress(py::module_& module);
+void bind_supervision(py::module_& module);
+void bind_imports(py::module_& module);
 void bind_recordings(py::module_& module);
 void bind_models(py::module_& module);
 void bind_estimators(py::module_& module);

@@ -24,34 +24,6 @@ LoadSheet load_sheet_of(const py::object& load) {
                                          : read_load_sheet(path_text(load));
 }
 
-/// Recordings, paths of logs or manifests, or lists of those.
-void append_recordings(const py::handle& item, std::vector<Recording>& recordings) {
-  if (py::isinstance<Recording>(item)) {
-    recordings.push_back(item.cast<const Recording&>());
-  } else if (is_path(item)) {
-    const std::string file = path_text(item);
-    for (Recording& recording : interruptible([&](const Progress& progress) {
-           LoadOptions options;
-           options.progress = progress;
-           return load_recordings(file, options);
-         }))
-      recordings.push_back(std::move(recording));
-  } else if (py::isinstance<py::sequence>(item)) {
-    for (const py::handle& each : py::reinterpret_borrow<py::sequence>(item))
-      append_recordings(each, recordings);
-  } else {
-    throw UsageError({.place = "recordings",
-                      .expected = "Recordings, paths of logs or manifests, or lists of them",
-                      .found = kind_of(item)});
-  }
-}
-
-std::vector<Recording> recordings_from(const py::object& items) {
-  std::vector<Recording> recordings;
-  append_recordings(items, recordings);
-  return recordings;
-}
-
 IdentifiedDrive identify(const py::object& items, const py::object& load, const py::object& drive,
                          const std::optional<std::vector<std::string>>& terms, bool has_spring,
                          const std::string& group_by, std::size_t starts, std::uint64_t seed,

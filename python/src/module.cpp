@@ -64,12 +64,15 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled part of torsio; use the package torsio.";
   module.attr("__version__") = torsio::kVersion;
   bind_errors(module);
+  bind_progress(module);
   bind_recordings(module);
   bind_models(module);
   bind_estimators(module);
   bind_batches(module);
   bind_learning(module);
   bind_control(module);
+  bind_supervision(module);
+  bind_imports(module);
   bind_drives(module);
   bind_arms(module);
   bind_links(module);

@@ -382,7 +382,35 @@ void bind_load(py::module_& module) {
       py::arg("path"), "Reads a load file (.yaml).");
 }
 
+void append_recordings(const py::handle& item, const LoadOptions& options,
+                       std::vector<Recording>& recordings) {
+  if (py::isinstance<Recording>(item)) {
+    recordings.push_back(item.cast<const Recording&>());
+  } else if (is_path(item)) {
+    const std::string file = path_text(item);
+    for (Recording& recording : interruptible([&](const Progress& progress) {
+           LoadOptions with_progress = options;
+           with_progress.progress = progress;
+           return load_recordings(file, with_progress);
+         }))
+      recordings.push_back(std::move(recording));
+  } else if (py::isinstance<py::sequence>(item)) {
+    for (const py::handle& each : py::reinterpret_borrow<py::sequence>(item))
+      append_recordings(each, options, recordings);
+  } else {
+    throw UsageError({.place = "recordings",
+                      .expected = "Recordings, paths of logs or manifests, or lists of them",
+                      .found = kind_of(item)});
+  }
+}
+
 }  // namespace
+
+std::vector<Recording> recordings_from(const py::object& items, const LoadOptions& options) {
+  std::vector<Recording> recordings;
+  append_recordings(items, options, recordings);
+  return recordings;
+}
 
 void bind_recordings(py::module_& module) {
   bind_recording(module);

@@ -41,7 +41,9 @@ from ._tables import recording_from_dict, recording_from_pandas, recording_to_pa
 if TYPE_CHECKING:
     from . import link, plot
     from ._drives import DriveParameter, IdentifiedDrive, identify, read_drive
-    from ._learning import attribute, check, compare, crossvalidate, drift, evaluate, fit, margins, track, transfer
+    from ._learning import attribute, check, compare, crossvalidate, drift, evaluate, fit, import_network, transfer
+    from ._loops import Tracking, margins, track
+    from ._progress import progress
     from ._results import (
         CheckReport,
         Comparison,
@@ -53,6 +55,16 @@ if TYPE_CHECKING:
         Margins,
         Results,
         Score,
+    )
+    from ._supervision import (
+        Adaptation,
+        MonitorReport,
+        MonitorSource,
+        adapt,
+        calibrate_monitor,
+        calibrate_simulated_monitor,
+        monitor,
+        monitor_simulated,
     )
 
 # Their types are in _core.pyi.
@@ -67,6 +79,7 @@ for _type in (Arm, ArmSimulation, Batch, Dataset, Estimate, Estimator, Load, Mod
 del _type
 
 __all__ = [
+    "Adaptation",
     "Arm",
     "ArmSimulation",
     "Batch",
@@ -87,11 +100,17 @@ __all__ = [
     "Load",
     "Margins",
     "Model",
+    "MonitorReport",
+    "MonitorSource",
     "Recording",
     "Results",
     "Score",
+    "Tracking",
     "UsageError",
+    "adapt",
     "attribute",
+    "calibrate_monitor",
+    "calibrate_simulated_monitor",
     "check",
     "compare",
     "crossvalidate",
@@ -101,10 +120,14 @@ __all__ = [
     "families",
     "fit",
     "identify",
+    "import_network",
     "link",
     "load",
     "margins",
+    "monitor",
+    "monitor_simulated",
     "plot",
+    "progress",
     "read",
     "read_drive",
     "read_load",
@@ -118,8 +141,12 @@ __all__ = [
 # Imported when they are first used: a loop that only loads a model starts sooner.
 _LATER = {
     "_drives": "DriveParameter IdentifiedDrive identify read_drive",
-    "_learning": "attribute check compare crossvalidate drift evaluate fit margins track transfer",
+    "_learning": "attribute check compare crossvalidate drift evaluate fit import_network transfer",
+    "_loops": "Tracking margins track",
+    "_progress": "progress",
     "_results": "CheckReport Comparison CrossValidation Document Estimates Finding FoldSummary Margins Results Score",
+    "_supervision": "Adaptation MonitorReport MonitorSource adapt calibrate_monitor calibrate_simulated_monitor"
+    " monitor monitor_simulated",
 }
 
 

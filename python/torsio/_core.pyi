@@ -329,16 +329,83 @@ def drift(model: Model, dataset: Dataset, reference: Model | None, seed: int) ->
 def transfer(
     base: Model, dataset: Dataset, use_s: float, method: str, seed: int
 ) -> tuple[str, Model]: ...
+def set_progress(listener: Any) -> Any: ...
+def import_network(
+    path: _Path,
+    inputs: Sequence[str],
+    rate_Hz: float,
+    target: str,
+    input_scale: Sequence[float],
+    output_scale: float,
+    activation: str,
+    output_name: str,
+    warm_up_samples: int | None,
+    folds_biases: bool,
+    guards: Dataset | None,
+    serial: str,
+) -> Model: ...
+def monitor(
+    path: _Path, recordings: Any, serial: str, mapping: _Path | None, rate_Hz: float | None
+) -> tuple[str, list[Recording]]: ...
+def calibrate_monitor(
+    path: _Path,
+    recordings: Any,
+    sources: Sequence[tuple[str, _Path, _Path | None, Sequence[str]]],
+    signals: Sequence[str],
+    serial: str,
+    valid_until: str,
+    false_alarms_per_hour: float,
+    extrapolates: bool,
+    least_threshold_Nm: float,
+    required_Nm: float,
+    persistence_s: float | None,
+    mapping: _Path | None,
+    rate_Hz: float | None,
+) -> str: ...
+def monitor_simulated(
+    actuator: str, path: _Path, injections: Sequence[str], schedule: str, duration_s: float, seed: int
+) -> tuple[str, list[Recording]]: ...
+def calibrate_simulated_monitor(
+    actuator: str, path: _Path, fault_free_hours: float, false_alarms_per_hour: float
+) -> str: ...
+def adapt(
+    model: Model,
+    dataset: Dataset,
+    held_out: float,
+    embargo_s: float,
+    method: str,
+    settings: Mapping[str, str],
+    serial: str,
+) -> tuple[str, Model]: ...
+
+class TrackCall:
+    reference: str
+    recorded: Recording | None
+    amplitude_Nm: float | None
+    duration_s: float | None
+    bandwidth_rad_s: float
+    damping: float
+    is_free: bool
+    lever_m: float | None
+    friction_share: float
+    observer_Hz: float | None
+    feeds_forward: bool
+    lowest_rad: float | None
+    highest_rad: float | None
+    speed_rad_s: float | None
+    acts_on_velocity: bool
+    velocity_rad_s: float | None
+    schedule: str
+    injections: Sequence[str]
+    def __init__(self) -> None: ...
+
 def track(
     actuator: str,
     models: Sequence[tuple[str, Model]],
-    reference: str,
-    amplitude_Nm: float | None,
-    duration_s: float | None,
-    bandwidth_rad_s: float,
-    is_free: bool,
+    call: TrackCall,
     seeds: Sequence[int],
-) -> str: ...
+    is_recorded: bool,
+) -> tuple[str, Recording | None]: ...
 def margins(
     actuator: str, bandwidth_rad_s: float, damping: float, load_inertia_kg_m2: float
 ) -> list[tuple[str, bool, float, float, float, float, float]]: ...

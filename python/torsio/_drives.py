@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Union, cast
 
 from . import _core
 from ._core import Load, Recording, UsageError
+from ._progress import Listener, shown
 from ._results import _data_frame, _document, _number, _table_html
 
 if TYPE_CHECKING:
@@ -238,6 +239,7 @@ def identify(
     seed: int = 1,
     standard_errors: bool = True,
     nested: bool = True,
+    progress: Listener | None = None,
 ) -> IdentifiedDrive:
     """Finds motor, friction and spring of a joint from its command, one angle and a known load (docs/use/identify.md).
 
@@ -247,6 +249,7 @@ def identify(
     spring: "auto" begins with a second mass and its spring.
     group_by: condition whose equal values are left out together, or "recording".
     standard_errors, nested: without them the fits that these need are saved.
+    progress: True for a line on standard error, or a function of (fraction, text) (`torsio.progress`).
     Equal arguments give equal results. Ctrl-C stops it.
     """
     _require_load(load)
@@ -258,9 +261,10 @@ def identify(
     _require_count("seed", seed, 0)
     for place, flag in (("spring", spring), ("standard_errors", standard_errors), ("nested", nested)):
         _require_flag(place, flag)
-    core = _core.identify(
-        recordings, load, drive, chosen, spring, group_by, starts, seed, standard_errors, nested
-    )
+    with shown(progress):
+        core = _core.identify(
+            recordings, load, drive, chosen, spring, group_by, starts, seed, standard_errors, nested
+        )
     return IdentifiedDrive(core, recordings, group_by)
 
 

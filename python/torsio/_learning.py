@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any, Union
 
 from . import _core
 from ._core import Dataset, Load, Model, Recording, UsageError
-from ._results import CheckReport, Comparison, CrossValidation, Document, Margins, Results
+from ._progress import Listener, shown
+from ._results import CheckReport, Comparison, CrossValidation, Document, Results
 
 #: A dataset, or recordings (of the role that the function needs), or paths of logs or manifests.
 Data = Union[Dataset, Recording, str, "PathLike[str]", Sequence[Any]]
@@ -64,6 +65,7 @@ def fit(
     allow_leak: bool = False,
     serial: str = "",
     load: KnownLoad | None = None,
+    progress: Listener | None = None,
     **options: Any,
 ) -> Model:
     """Trains one model on the recordings with the role train; equal arguments give equal models.
@@ -71,11 +73,14 @@ def fit(
     inputs: expressions of channels (docs/use/expressions.md); without them, the deflection of the spring, its
     rate and the speed of the joint, as far as they are there.
     load: the target is the torque of this known load instead of that of a sensor (docs/use/known_load.md).
+    progress: True for a line on standard error, or a function of (fraction, text) (`torsio.progress`).
     options: those of the family (`torsio.families()`), as layers="64", branch=True.
     Ctrl-C stops it.
     """
     given = {name: _option(value) for name, value in options.items()}
-    return _core.fit(_dataset(data, "train", load=load), family, given, _inputs(inputs), seed, allow_leak, serial)
+    with shown(progress):
+        dataset = _dataset(data, "train", load=load)
+        return _core.fit(dataset, family, given, _inputs(inputs), seed, allow_leak, serial)
 
 
 def evaluate(
@@ -97,13 +102,16 @@ def compare(
     inputs: str | Sequence[str] | None = None,
     seed: int = 1,
     allow_leak: bool = False,
+    progress: Listener | None = None,
 ) -> Comparison:
     """Trains several families and ranks them on the held-out recordings (docs/use/evaluation.md).
 
     models: "all", or families with options after colons: "linear,polynomial:degree=7".
+    progress: as for `fit`.
     """
     names = models if isinstance(models, str) else ",".join(models)
-    text, best = _core.compare(_dataset(data, "train"), names, _inputs(inputs), seed, allow_leak)
+    with shown(progress):
+        text, best = _core.compare(_dataset(data, "train"), names, _inputs(inputs), seed, allow_leak)
     return Comparison(Results.from_json(text), best)
 
 
@@ -117,15 +125,18 @@ def crossvalidate(
     embargo_s: float = 1.0,
     seed: int = 1,
     allow_leak: bool = False,
+    progress: Listener | None = None,
 ) -> CrossValidation:
     """Trains every model on each fold's rest and scores it on the fold.
 
     by: "record" for one fold a recording, or a condition, each value of which is a fold.
+    progress: as for `fit`.
     """
     names = models if isinstance(models, str) else ",".join(models)
-    text = _core.crossvalidate(
-        _dataset(data, "train"), names, _inputs(inputs), folds, by, embargo_s, seed, allow_leak
-    )
+    with shown(progress):
+        text = _core.crossvalidate(
+            _dataset(data, "train"), names, _inputs(inputs), folds, by, embargo_s, seed, allow_leak
+        )
     return CrossValidation.from_json(text)
 
 
@@ -165,29 +176,44 @@ def transfer(
     return model, Document.from_json(text, "methods")
 
 
-def track(
-    actuator: str,
-    models: Mapping[str, Model],
-    reference: str = "chirp",
+def import_network(
+    path: str | PathLike[str],
+    inputs: str | Sequence[str],
+    rate_Hz: float,
     *,
-    amplitude_Nm: float | None = None,
-    duration_s: float | None = None,
-    bandwidth_rad_s: float = 50.0,
-    is_free: bool = False,
-    seeds: Sequence[int] = (1,),
-) -> Document:
-    """A torque loop on a simulated joint, with each model and with a line from sweeps (docs/simulation/tracking.md).
+    target: str = "torque_Nm",
+    input_scale: Sequence[float] = (),
+    output_scale: float = 1.0,
+    activation: str = "",
+    output_name: str = "",
+    warm_up_samples: int | None = None,
+    fold_biases: bool = False,
+    guards: Data | None = None,
+    serial: str = "",
+) -> Model:
+    """A network that another program trained, as a model (docs/models/import.md).
 
-    reference: chirp, random_walk, steps or sweep. is_free: the lever moves; else the output is locked.
+    path: an ONNX graph, or PyTorch weights by name as JSON.
+    inputs: one expression of channels for each input of the network, in its order. rate_Hz: of its training.
+    input_scale, output_scale: factors by which its program multiplied inputs and output, 1 without them.
+    activation: of the hidden dense layers of JSON weights: linear, relu, tanh, softsign or elu.
+    output_name: the output of an ONNX graph that estimates the target; its first without it.
+    warm_up_samples: after a reset, until a network with memory is valid; without it the graph's window, else 0.
+    guards: recordings from which range guard, fallback and error bar are computed; `model.notes` states what is
+    missing without them.
     """
-    text = _core.track(
-        actuator, list(models.items()), reference, amplitude_Nm, duration_s, bandwidth_rad_s, is_free, list(seeds)
+    dataset = None if guards is None else _dataset(guards, "train", target)
+    return _core.import_network(
+        path,
+        _inputs(inputs),
+        rate_Hz,
+        target,
+        list(input_scale),
+        output_scale,
+        activation,
+        output_name,
+        warm_up_samples,
+        fold_biases,
+        dataset,
+        serial,
     )
-    return Document.from_json(text, "results")
-
-
-def margins(
-    actuator: str, *, bandwidth_rad_s: float = 50.0, damping: float = 0.9, load_inertia_kg_m2: float = 0.0
-) -> list[Margins]:
-    """Stability margins of the deflection control at 1 kHz on the data sheet of an actuator, locked and free."""
-    return [Margins(*row) for row in _core.margins(actuator, bandwidth_rad_s, damping, load_inertia_kg_m2)]
