@@ -7,6 +7,9 @@ export interface View {
   reset(): void;
 }
 
+/** So long after the last event lines are drawn in their full width: those of one pixel are many times faster. */
+export const kRest_ms = 200;
+
 function add_button(row: HTMLElement, label: string, action: () => void): HTMLButtonElement {
   const button = document.createElement("button");
   button.type = "button";

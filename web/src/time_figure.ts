@@ -1,7 +1,7 @@
 import uPlot from "uplot";
 import { angle_factor, angle_text, on_angle_unit, scaled } from "./angles";
 import type { TimeFigure, TimePanel, TimeSeries } from "./document";
-import { add_controls, add_legend, make_frame } from "./figure_frame";
+import { add_controls, add_legend, kRest_ms, make_frame } from "./figure_frame";
 import type { Frame, LegendEntry, View } from "./figure_frame";
 import type { SampleSource, Samples } from "./sample_source";
 import { css_colour, on_theme, series_colour, series_dash } from "./theme";
@@ -36,8 +36,11 @@ function with_gaps(values: Float32Array): Float32Array | (number | null)[] {
 export class TimeView implements View {
   private readonly frame: Frame;
   private readonly panels: Panel[] = [];
+  /** The index of the colour of each curve. */
+  private readonly colours = new Map<string, number>();
   private view: [number, number];
   private is_waiting = false;
+  private rest = 0;
 
   /** @param source_of the samples of the series of one panel */
   constructor(
@@ -48,7 +51,7 @@ export class TimeView implements View {
     this.frame = make_frame(place, figure.title);
     this.frame.marks.hidden = figure.marks.length === 0;
     const entries: (LegendEntry & { at: [panel: number, series: number][] })[] = [];
-    const colours = new Map<string, number>();
+    const { colours } = this;
     figure.panels.forEach((panel, p) => {
       panel.series.forEach((series, s) => {
         const index = colour_index(colours, series);
@@ -59,7 +62,7 @@ export class TimeView implements View {
       });
     });
     figure.panels.forEach((panel, p) => {
-      const plot = this.make_plot(panel, colours, p);
+      const plot = this.make_plot(panel, p);
       this.panels.push({ label: panel.label, plot, source: source_of(panel.series), is_near: true, drawn: null });
     });
     this.view = [this.begin_s, this.end_s];
@@ -118,12 +121,39 @@ export class TimeView implements View {
     const begin = Math.max(begin_s, this.begin_s);
     const end = Math.min(Math.max(end_s, begin + shortest), this.end_s);
     this.view = [Math.min(begin, end - shortest), end];
+    this.use_thin_lines();
     if (this.is_waiting) return;
     this.is_waiting = true;
     requestAnimationFrame(() => {
       this.is_waiting = false;
       this.update();
     });
+  }
+
+  /** Until the range of time is at rest. */
+  private use_thin_lines(): void {
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => {
+      this.set_widths(false);
+      this.panels.forEach(({ plot, is_near }) => is_near && plot.redraw(false));
+    }, kRest_ms);
+    this.set_widths(true);
+  }
+
+  private set_widths(is_thin: boolean): void {
+    this.panels.forEach(({ plot }, p) =>
+      this.figure.panels[p].series.forEach((series, s) => {
+        plot.series[s + 1].width = is_thin ? 1 : this.line_width(series);
+        plot.series[s + 1].dash = is_thin ? [] : this.line_dash(series);
+      }),
+    );
+  }
+
+  private line_width(series: TimeSeries): number {
+    return this.figure.live ? kLiveWidth : (kWidths[series.role] ?? 1.25);
+  }
+  private line_dash(series: TimeSeries): number[] {
+    return series.role === "limit" ? [4, 4] : series_dash(this.colours.get(colour_key(series)) ?? 0);
   }
 
   /** Draws this range at once, also beyond the samples: that of a joint that is running. */
@@ -217,7 +247,7 @@ export class TimeView implements View {
     this.frame.toolbar.append(label);
   }
 
-  private make_plot({ label, series, names }: TimePanel, colours: Map<string, number>, index: number): uPlot {
+  private make_plot({ label, series, names }: TimePanel, index: number): uPlot {
     const grid = () => css_colour("--grid");
     const text = () => css_colour("--text");
     const axis = { stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 } };
@@ -242,9 +272,9 @@ export class TimeView implements View {
           ...series.map((one) => ({
             label: one.label,
             show: one.shown,
-            stroke: () => css_colour(series_colour(one.role, colours.get(colour_key(one)) ?? 0)),
-            dash: one.role === "limit" ? [4, 4] : series_dash(colours.get(colour_key(one)) ?? 0),
-            width: this.figure.live ? kLiveWidth : (kWidths[one.role] ?? 1.25),
+            stroke: () => css_colour(series_colour(one.role, this.colours.get(colour_key(one)) ?? 0)),
+            dash: this.line_dash(one),
+            width: this.line_width(one),
             points: { show: false },
           })),
         ],

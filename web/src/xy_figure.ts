@@ -1,6 +1,6 @@
 import { angle_factor, angle_text, on_angle_unit, scaled } from "./angles";
 import type { Numbers, XyFigure } from "./document";
-import { add_controls, add_legend, make_frame } from "./figure_frame";
+import { add_controls, add_legend, kRest_ms, make_frame } from "./figure_frame";
 import type { Frame, View } from "./figure_frame";
 import type { Box } from "./label_places";
 import { Scale, scale_of } from "./scale";
@@ -28,6 +28,7 @@ export class XyView implements View, Plane {
   private bottom = kBottom;
   private is_fitted = true;
   private is_waiting = false;
+  private rest = 0;
 
   /** @param numbers_of the numbers of a series */
   constructor(
@@ -131,8 +132,11 @@ export class XyView implements View, Plane {
     this.y = scale_of(heights, this.figure.y.log);
   }
 
-  /** Once for all events of a frame. */
+  /** Once for all events of a frame; with thin lines until the last of them. */
   private draw_soon(): void {
+    this.svg.classList.add("moving");
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => this.svg.classList.remove("moving"), kRest_ms);
     if (this.is_waiting) return;
     this.is_waiting = true;
     requestAnimationFrame(() => {

@@ -45,20 +45,35 @@ export function draw_series(plane: Plane, layer: Element, one: Drawn): void {
     const share = range.share(one.colour[i]);
     return Number.isFinite(share) ? Math.min(Math.max(Math.floor(share * colours), 0), colours - 1) : 0;
   };
+  const { left, top, width, height } = plane.area();
+  /** On which sides of the area a point is. */
+  const sides = (x: number, y: number) =>
+    (x < left ? 1 : x > left + width ? 2 : 0) | (y < top ? 4 : y > top + height ? 8 : 0);
   const paths: string[] = new Array<string>(colours).fill("");
   let pen = -1;
+  let before: Point = [NaN, NaN];
   for (let i = 0; i < one.x.length; ++i) {
     const [x, y] = [plane.pixel_x(one.x[i]), plane.pixel_y(one.y[i])];
     const bin = bin_of(i);
     if (!Number.isFinite(x) || !Number.isFinite(y)) {
       pen = -1;
+      before = [NaN, NaN];
       continue;
     }
-    const point = `${x.toFixed(1)} ${y.toFixed(1)}`;
-    if (style === "points") paths[bin] += `M${point}h0`;
-    else if (pen < 0) paths[bin] += `M${point}`;
-    else paths[pen] += `L${point}`;
-    if (style === "line" && pen >= 0 && pen !== bin) paths[bin] += `M${point}`;
+    const [x0, y0] = before;
+    before = [x, y];
+    const outside = sides(x, y);
+    if (style === "points") {
+      if (outside === 0) paths[bin] += `M${x.toFixed(1)} ${y.toFixed(1)}h0`;
+      continue;
+    }
+    // A segment that is all on one side of the area is not drawn.
+    if (Number.isNaN(x0) || (outside & sides(x0, y0)) !== 0) {
+      pen = -1;
+      continue;
+    }
+    if (pen !== bin) paths[bin] += `M${x0.toFixed(1)} ${y0.toFixed(1)}`;
+    paths[bin] += `L${x.toFixed(1)} ${y.toFixed(1)}`;
     pen = bin;
   }
   paths.forEach((d, bin) => {
