@@ -136,7 +136,10 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   if (family.is_spring && !family.takes_levels) require_motion(data.training);
 
   const auto start = std::chrono::steady_clock::now();
-  FittedModel fitted = family.fit(data.training, options, context);
+  std::vector<TrainingEpoch> history;
+  FitContext recorded = context;
+  recorded.note_epoch = [&](const TrainingEpoch& epoch) { history.push_back(epoch); };
+  FittedModel fitted = family.fit(data.training, options, recorded);
   const std::chrono::duration<double> fit_time = std::chrono::steady_clock::now() - start;
 
   const HeldOutErrors held_out =
@@ -170,7 +173,8 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
                                 .parameters = fitted.model.parameters()},
                        .notes = std::move(fitted.notes),
                        .table = std::move(fitted.table),
-                       .fit_seconds = fit_time.count()};
+                       .fit_seconds = fit_time.count(),
+                       .history = std::move(history)};
   trained.notes.insert(trained.notes.begin(), notes.begin(), notes.end());
   for (const ZeroRule& zero : trained.file.card.zeros)
     if (std::ranges::find(pipeline.raw_inputs(), zero.channel) != pipeline.raw_inputs().end())

@@ -34,6 +34,22 @@ TEST(TrainModel, TakesTheZerosOfTheTrainingRecords) {
   EXPECT_THROW((void)train_model(dataset, choice, 1), Error);
 }
 
+TEST(TrainModel, RecordsTheEpochsOfANetworkAndNoneOfAnotherFamily) {
+  const Dataset dataset = test::bench_dataset();
+  const FeatureSpec inputs = resolve_inputs(dataset, {});
+  const TrainedModel network = train_model(
+      dataset,
+      {.family = "mlp", .options = {{"epochs", "4"}, {"patience", "0"}}, .features = inputs}, 1);
+  ASSERT_GE(network.history.size(), 4U);
+  for (std::size_t k = 0; k < network.history.size(); ++k) {
+    EXPECT_EQ(network.history[k].epoch, k % 4 + 1) << "each start has four epochs";
+    EXPECT_GT(network.history[k].training_error, 0.0);
+    EXPECT_GT(network.history[k].held_out_error, 0.0);
+  }
+  EXPECT_LT(network.history[3].training_error, network.history[0].training_error);
+  EXPECT_TRUE(train_model(dataset, {.family = "linear", .features = inputs}, 1).history.empty());
+}
+
 TEST(TrainModel, RefusesAnInverseWhoseTargetIsOffByUnknownZeros) {
   Dataset dataset = test::bench_dataset();
   dataset.target = "spring_deflection_rad";

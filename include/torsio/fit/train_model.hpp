@@ -34,6 +34,7 @@ struct TrainedModel {
   std::vector<std::string> notes;  ///< messages about the fit for the user
   std::vector<FittedParameter> table = {};
   double fit_seconds = 0.0;
+  std::vector<TrainingEpoch> history = {};  ///< epochs of networks; after a resume only the rest
 };
 
 /// Recording -> features -> fitted model -> guards: the function of `torsio fit`. Only records with

@@ -281,10 +281,14 @@ class Training {
   }
 
   void end_epoch() {
-    const double loss = validation_.starts.empty()
-                            ? state_.epoch_loss / static_cast<double>(batches_)
-                            : trainer_.loss(state_.weights, validation_);
+    const bool is_validated = !validation_.starts.empty();
+    const double training_loss = state_.epoch_loss / static_cast<double>(batches_);
+    const double loss = is_validated ? trainer_.loss(state_.weights, validation_) : training_loss;
     ++state_.epoch;
+    if (context_.note_epoch)
+      context_.note_epoch({.epoch = state_.epoch,
+                           .training_error = std::sqrt(training_loss),
+                           .held_out_error = is_validated ? std::sqrt(loss) : kNotMeasured});
     state_.batch = 0;
     state_.epoch_loss = 0.0;
     last_loss_ = loss;

@@ -73,6 +73,37 @@ XyFigure coefficient_figure(const FitReport& report) {
   return figure;
 }
 
+/// The error over the epochs of each network that was trained.
+XyFigure training_figure(const std::vector<TrainingEpoch>& history) {
+  XyFigure figure{.title = "Training history",
+                  .x = {"epoch"},
+                  .y = {"RMSE / standard deviation", true},
+                  .series = {}};
+  std::size_t last = 0;
+  std::size_t networks = 0;
+  for (const TrainingEpoch& epoch : history) {
+    if (epoch.epoch <= last || networks == 0) {
+      ++networks;
+      for (const char* of : {"training", "held out"})
+        figure.series.push_back(
+            {.label = networks == 1 ? of : fmt::format("{}, network {}", of, networks),
+             .x = {},
+             .y = {}});
+    }
+    last = epoch.epoch;
+    const double errors[] = {epoch.training_error, epoch.held_out_error};
+    for (std::size_t k = 0; k < 2; ++k) {
+      XySeries& series = figure.series[figure.series.size() - 2 + k];
+      series.x.push_back(static_cast<double>(epoch.epoch));
+      series.y.push_back(errors[k]);
+    }
+  }
+  std::erase_if(figure.series, [](const XySeries& series) {
+    return std::ranges::none_of(series.y, [](double error) { return std::isfinite(error); });
+  });
+  return figure;
+}
+
 ReportSection fit_section(const FitReport& report) {
   ReportSection section{.heading = "The fit",
                         .text = fmt::format("Residuals of the {} samples.", report.split),
@@ -126,6 +157,8 @@ ReportDocument fit_page(const ReportedFit& fit, const std::string& model, const 
   document.title = "Fit of " + model;
   ReportSection section = fit_section(fit.report);
   for (const std::string& note : fit.trained.notes) section.text += " " + note + ".";
+  if (!fit.trained.history.empty())
+    section.figures.insert(section.figures.begin(), training_figure(fit.trained.history));
   document.sections.insert(document.sections.begin() + 1, std::move(section));
   return document;
 }
