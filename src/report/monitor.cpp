@@ -221,6 +221,39 @@ std::string replays_text(const std::vector<MonitorReplay>& replays,
   return text;
 }
 
+TextTable verdict_table(const std::vector<MonitorReplay>& replays) {
+  TextTable table;
+  table.header({"recording", "result", "one fault of any of these explains it"});
+  for (const MonitorReplay& replay : replays)
+    table.row(
+        {replay.estimated.channels.name(), verdict(replay),
+         replay.suspects.empty() ? "-" : fmt::format("{}", fmt::join(replay.suspects, ", "))});
+  return table;
+}
+
+TextTable finding_table(const std::vector<MonitorReplay>& replays,
+                        const MonitorSettings& settings) {
+  TextTable table;
+  table.header({"recording", "at [s]", "what", "check", "found", "fault of the source"});
+  const auto add = [&](const MonitorReplay& replay, const std::string& at_s, std::string_view what,
+                       const MonitorReplay::Finding& finding) {
+    table.row({replay.estimated.channels.name(), at_s, std::string(what),
+               std::string(name(finding.check)), describe(finding, settings),
+               finding.fault == Fault::none ? "-" : std::string(name(finding.fault))});
+  };
+  for (const MonitorReplay& replay : replays) {
+    if (std::isnan(replay.watching_from_s))
+      for (const MonitorReplay::NotReady& of : replay.not_ready)
+        add(replay, "-", fmt::format("not ready for {:.3f} s", of.present_s), of.event);
+    for (const MonitorReplay::Finding& event : replay.events)
+      add(replay, fmt::format("{:.3f}", event.t_s), name(event.action), event);
+    for (const MonitorReplay::Injection& of : replay.injections)
+      table.row({replay.estimated.channels.name(), fmt::format("{:.3f}", of.start_s), "injected",
+                 "-", fmt::format("{}: {}", of.fault, outcome(replay, of)), "-"});
+  }
+  return table;
+}
+
 std::string replays_json(const std::vector<MonitorReplay>& replays,
                          const MonitorSettings& settings) {
   Json document{{"recordings", Json::array()}};

@@ -6,6 +6,7 @@
 #include "sim/campaign/fused_accuracy.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
+#include "torsio/report/text_table.hpp"
 
 namespace torsio {
 
@@ -16,6 +17,11 @@ namespace torsio {
 /// What was found when, one line a finding, and a plot of the torques for a recording that stopped.
 [[nodiscard]] std::string replays_text(const std::vector<MonitorReplay>& replays,
                                        const MonitorSettings& settings);
+/// What the monitor reports of each recording.
+[[nodiscard]] TextTable verdict_table(const std::vector<MonitorReplay>& replays);
+/// Findings, reasons why it was not ready, and injected faults with their outcome: a row for each.
+[[nodiscard]] TextTable finding_table(const std::vector<MonitorReplay>& replays,
+                                      const MonitorSettings& settings);
 [[nodiscard]] std::string replays_json(const std::vector<MonitorReplay>& replays,
                                        const MonitorSettings& settings);
 /// One row per actuator: errors of the combined torque and of its sources.

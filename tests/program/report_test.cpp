@@ -36,7 +36,7 @@ TEST_F(Report, OfEachVerbHasItsCommandAndFigures) {
         "crossvalidate a.csv b.csv --models linear --folds 2",
         "attribute m.safetensors b.csv --windows 5 --background 5",
         "transfer m.safetensors b.csv --use 5s", "simulate dfki-50 sweep --duration 5s -o c.csv",
-        "track --duration 10s", "track --impedance 2000Nm_rad --duration 10s"}) {
+        "track --duration 10s", "track --impedance 2000Nm_rad --duration 10s", "tune-loop"}) {
     const Outcome outcome = torsio(std::string(call) + " --report out.html");
     ASSERT_EQ(outcome.exit_code, 0) << call << "\n" << outcome.err;
     EXPECT_NE(contents("out.html").find(std::string("torsio ") + call), std::string::npos) << call;

@@ -20,6 +20,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/data/write.hpp"
+#include "torsio/report/html/loop_report.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
@@ -321,8 +322,15 @@ void run(TrackFlags& flags, const CLI::App& verb) {
   }
   if (flags.json.wants_tables()) print(torsio::tracking_text(rows));
   flags.json.write(torsio::tracking_json(rows));
-  if (flags.report.is_wanted())
-    flags.report.write(torsio::tracking_report(rows, recorded_run ? &*recorded_run : nullptr));
+  if (flags.report.is_wanted()) {
+    torsio::ReportDocument document =
+        torsio::tracking_report(rows, recorded_run ? &*recorded_run : nullptr);
+    if (spec.actuation == torsio::DeflectionController::Actuation::current) {
+      const torsio::DrawnLoop loop{"output " + flags.output, torsio::open_torque_loop(sheet, spec)};
+      document.sections.push_back(torsio::loop_section({&loop, 1}));
+    }
+    flags.report.write(std::move(document));
+  }
   for (const torsio::TrackingRow& row : rows)
     if (row.status == "failed") throw torsio::Error({.place = row.model, .problem = row.reason});
 }

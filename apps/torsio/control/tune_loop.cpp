@@ -8,9 +8,12 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
+#include "common/report_output.hpp"
+#include "control/design/loop_design.hpp"
 #include "core/quantity.hpp"
 #include "report/json_text.hpp"
 #include "torsio/actuator/controller_file.hpp"
@@ -20,6 +23,8 @@
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/report/html/loop_report.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
 #include "verbs.hpp"
@@ -45,11 +50,13 @@ struct TuneFlags {
   std::string controller;
   bool overwrite = false;
   JsonOutput json;
+  ReportOutput report;
 };
 
 /// Margins and passivity of a loop with these gains.
 struct Tuned {
   torsio::DeflectionController controller;
+  torsio::JointFeedback feedback;
   torsio::Margins locked;
   torsio::Margins free;
   torsio::Passivity passive;
@@ -75,6 +82,7 @@ Tuned tuned(const TuneFlags& flags) {
   const torsio::TorqueLoopCore core(loop, kRate_Hz);
   const torsio::DeflectionController& controller = core.deflection();
   return {.controller = controller,
+          .feedback = core.feedback(),
           .locked = core.margins_of(JointOutput::locked),
           .free = core.margins_of(JointOutput::free),
           .passive = torsio::passivity(settings.joint, core.feedback()),
@@ -208,12 +216,32 @@ void write_controller(const TuneFlags& flags, const Tuned& loop) {
   if (flags.json.wants_tables()) print(fmt::format("{} written\n", flags.controller));
 }
 
+torsio::ReportDocument report_of(const TuneFlags& flags, const Tuned& loop) {
+  using torsio::JointOutput;
+  const torsio::SeriesElasticJoint& joint = loop.controller.settings().joint;
+  const std::vector<torsio::DrawnLoop> loops = {
+      {"output locked", torsio::open_loop(joint, loop.feedback, JointOutput::locked)},
+      {"output free", torsio::open_loop(joint, loop.feedback, JointOutput::free)}};
+  torsio::ReportDocument document = torsio::text_report(
+      "Torque loop of " + flags.actuator,
+      {fmt::format("The loop with the gains for {:.4g} Hz has a phase margin of {} deg with the "
+                   "output locked and of {} deg with the output free.",
+                   loop.controller.settings().bandwidth_rad_s / kTurn,
+                   number(torsio::deg_from_rad(loop.locked.phase_rad)),
+                   number(torsio::deg_from_rad(loop.free.phase_rad))),
+       "The margins are those of the data sheet's joint; a real one differs."},
+      text_of(flags, loop));
+  document.sections.insert(document.sections.begin(), torsio::loop_section(loops));
+  return document;
+}
+
 void run(const TuneFlags& flags) {
-  DataFlags().check_outputs({flags.json.destination});
+  DataFlags().check_outputs({flags.json.destination, flags.report.destination, flags.report.plot});
   const Tuned loop = tuned(flags);
   if (flags.json.wants_tables()) print(text_of(flags, loop));
   flags.json.write(torsio::json_text(json_of(flags, loop)));
   if (!flags.controller.empty()) write_controller(flags, loop);
+  if (flags.report.is_wanted()) flags.report.write(report_of(flags, loop));
 }
 
 }  // namespace
@@ -254,5 +282,6 @@ void add_tune_loop(CLI::App& app) {
   verb->add_flag("--overwrite", flags->overwrite, "replace the file if it exists");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb, "magnitude");
   verb->callback([flags] { run(*flags); });
 }

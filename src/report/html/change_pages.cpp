@@ -93,6 +93,8 @@ TimeFigure monitor_figure(const MonitorReplay& replay) {
   };
   const double last_s = channels.time_s(channels.size() - 1);
   if (std::isfinite(replay.stopped_at_s)) mark(replay.stopped_at_s, last_s, "stop", true);
+  for (const MonitorReplay::Finding& event : replay.events)
+    mark(event.t_s, event.t_s, fmt::format("{}: {}", name(event.action), name(event.check)), false);
   for (const MonitorReplay::Injection& injection : replay.injections)
     mark(injection.start_s, injection.start_s, "injected: " + injection.fault, false);
   TimeFigure figure =
@@ -248,8 +250,11 @@ ReportDocument monitor_report(const std::vector<MonitorReplay>& replays,
                                       "checks detects."},
                           .sections = {},
                           .origin = {}};
-  document.sections.push_back(
-      {.heading = "Findings", .preformatted = replays_text(replays, settings)});
+  ReportSection findings{.heading = "Findings", .preformatted = replays_text(replays, settings)};
+  findings.tables.push_back(words_table(verdict_table(replays)));
+  if (const TextTable found = finding_table(replays, settings); !found.rows().empty())
+    findings.tables.push_back(words_table(found, "Findings over time"));
+  document.sections.push_back(std::move(findings));
   constexpr std::size_t kRecordings = 4;
   for (std::size_t r = 0; r < std::min(replays.size(), kRecordings); ++r)
     document.sections.push_back(

@@ -62,6 +62,12 @@ ReportSection ranking_section(const Results& results, Role split) {
   return section;
 }
 
+ReportSection warning_section(const std::vector<std::string>& warnings) {
+  ReportTable table{.headings = {"warning"}, .rows = {}, .is_words = true};
+  for (const std::string& warning : warnings) table.rows.push_back({{warning}});
+  return {.heading = "Warnings", .tables = {std::move(table)}};
+}
+
 /// Error against the cost of a step. The front: no other model is better and cheaper.
 XyFigure cost_figure(const Results& results, const std::vector<const ResultRow*>& rows) {
   XySeries models{.label = "models", .style = CurveStyle::points, .x = {}, .y = {}};
@@ -124,13 +130,12 @@ ReportDocument comparison_report(const Comparison& comparison, const Dataset& da
             ? ""
             : fmt::format("; {} more could not be ranked", ranked.others.size())));
   }
-  for (const std::string& warning : results.warnings)
-    document.summary.push_back("Warning: " + warning + ".");
   for (const Role role : {Role::validation, Role::test})
     if (std::ranges::any_of(results.rows, [&](const ResultRow& row) { return row.split == role; }))
       document.sections.push_back(ranking_section(results, role));
   if (!ranked.rows.empty())
     document.sections.back().figures.emplace_back(cost_figure(results, ranked.rows));
+  if (!results.warnings.empty()) document.sections.push_back(warning_section(results.warnings));
   const std::vector<ReportedModel> models = in_order_of(ranked.rows, comparison.models);
   std::ranges::move(model_sections(dataset, models, progress),
                     std::back_inserter(document.sections));

@@ -8,6 +8,7 @@
 
 #include "report/html/model_run.hpp"
 #include "report/html/residual_figures.hpp"
+#include "report/html/speed_loops.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -25,11 +26,6 @@ Role reported_role(const Dataset& dataset) {
   return Role::train;
 }
 
-std::string with_unit(const std::string& channel) {
-  const std::string unit = unit_label(channel);
-  return unit.empty() ? channel : fmt::format("{} [{}]", channel, unit);
-}
-
 XySeries curve(std::string label, CurveRole role, bool is_shown, const std::vector<double>& x,
                const std::vector<double>& y) {
   ThinnedCurve thin = thinned(x, y);
@@ -42,7 +38,7 @@ XySeries curve(std::string label, CurveRole role, bool is_shown, const std::vect
 
 XyFigure loops(const RecordRuns& record) {
   XyFigure figure{.title = fmt::format("{} over {}", record.target->name, record.input_name),
-                  .x = {record.input_name},
+                  .x = {with_unit(record.input_name)},
                   .y = {with_unit(record.target->name)},
                   .series = {}};
   const std::vector<double>& x = record.input;
@@ -59,7 +55,7 @@ XyFigure coloured_loop(const RecordRuns& record) {
   XySeries by_time{.label = "measured", .x = std::move(thin.x), .y = std::move(thin.y)};
   for (const std::size_t n : thin.kept) by_time.colour.push_back(record.recording->time_s(n));
   return {.title = "The measured loop, coloured by time",
-          .x = {record.input_name},
+          .x = {with_unit(record.input_name)},
           .y = {with_unit(record.target->name)},
           .series = {std::move(by_time)},
           .colour_label = "time, from dark at the start to light at the end"};
@@ -145,6 +141,9 @@ std::vector<ReportSection> model_sections(const Dataset& dataset,
       section.figures.emplace_back(
           time_series(runs, values_of_figure(runs.recording->size()) / shown));
       section.figures.emplace_back(coloured_loop(runs));
+      section.figures.emplace_back(speed_loops(runs.input_name, runs.input, runs.target->name,
+                                               runs.target->values,
+                                               runs.recording->sample_rate_Hz()));
       std::ranges::move(residual_figures(runs), std::back_inserter(section.figures));
     }
     sections.push_back(std::move(section));

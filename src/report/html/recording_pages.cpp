@@ -5,6 +5,7 @@
 
 #include "report/html/model_report.hpp"
 #include "report/html/report_parts.hpp"
+#include "report/html/speed_loops.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "report/identify.hpp"
 #include "report/result_parts.hpp"
@@ -105,9 +106,13 @@ ReportDocument check_report(const std::vector<Finding>& findings, const Dataset*
     }
     TimeFigure series = channels_figure(recording, "Channels over time", std::move(places), input);
     series.marks = std::move(marks);
-    section.figures.emplace_back(loop_figure(
-        fmt::format("{} over {}", dataset->target, spec.inputs.front()), spec.inputs.front(),
-        dataset->target, input, recording.channel(dataset->target).values, recording));
+    section.figures.emplace_back(
+        loop_figure(fmt::format("{} over {}", dataset->target, spec.inputs.front()),
+                    with_unit(spec.inputs.front()), with_unit(dataset->target), input,
+                    recording.channel(dataset->target).values, recording));
+    section.figures.emplace_back(speed_loops(spec.inputs.front(), input, dataset->target,
+                                             recording.channel(dataset->target).values,
+                                             recording.sample_rate_Hz()));
     section.figures.emplace_back(std::move(series));
     document.sections.push_back(std::move(section));
   }
@@ -116,8 +121,6 @@ ReportDocument check_report(const std::vector<Finding>& findings, const Dataset*
 
 ReportDocument simulation_report(const Recording& recording, std::span<const double> twist_rad,
                                  const std::string& title) {
-  std::vector<double> twist_deg(twist_rad.begin(), twist_rad.end());
-  for (double& twist : twist_deg) twist = deg_from_rad(twist);
   ReportDocument document{
       .title = title,
       .summary =
@@ -128,8 +131,8 @@ ReportDocument simulation_report(const Recording& recording, std::span<const dou
       .sections = {},
       .origin = {}};
   ReportSection section{.heading = "Recording"};
-  section.figures.emplace_back(loop_figure("Torque over the measured twist", "deflection [deg]",
-                                           "torque [Nm]", twist_deg,
+  section.figures.emplace_back(loop_figure("Torque over the measured twist", "deflection [rad]",
+                                           "torque [Nm]", twist_rad,
                                            recording.channel("torque_Nm").values, recording));
   section.figures.emplace_back(channels_figure(recording, "Channels over time", {}, twist_rad));
   document.sections.push_back(std::move(section));

@@ -14,4 +14,11 @@ namespace torsio {
   return report;
 }
 
+/// The same with columns of sentences.
+[[nodiscard]] inline ReportTable words_table(const TextTable& table, std::string title = {}) {
+  ReportTable report = report_table(table, std::move(title));
+  report.is_words = true;
+  return report;
+}
+
 }  // namespace torsio

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "report/html/speed_loops.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -46,15 +47,6 @@ XyFigure scatter(const Context& of, const std::string& title, const std::string&
     figure.series.push_back(std::move(series));
   }
   return figure;
-}
-
-/// Central differences over 0.1 s, which leave out the noise and the steps of an encoder.
-std::vector<double> rate_of(const std::vector<double>& x, double rate_Hz) {
-  const auto half = std::max<std::size_t>(static_cast<std::size_t>(0.05 * rate_Hz), 1);
-  std::vector<double> rate(x.size(), kNotMeasured);
-  for (std::size_t n = half; n + half < x.size(); ++n)
-    rate[n] = (x[n + half] - x[n - half]) * rate_Hz / (2.0 * static_cast<double>(half));
-  return rate;
 }
 
 std::vector<double> finite(const std::vector<double>& values) {
@@ -250,16 +242,16 @@ std::vector<ReportFigure> residual_figures(const RecordRuns& record) {
                    .rate_Hz = recording.sample_rate_Hz()};
   std::vector<double> time_s(recording.size());
   for (std::size_t n = 0; n < time_s.size(); ++n) time_s[n] = recording.time_s(n);
-  return {
-      scatter(of, "Residuals over the first input", record.input_name, record.input),
-      scatter(of, "Residuals over the rate of the first input",
-              fmt::format("d/dt {} [1/s]", record.input_name), rate_of(record.input, of.rate_Hz)),
-      scatter(of, "Residuals over the target", record.target->name, record.target->values),
-      scatter(of, "Residuals over time", "time [s]", time_s),
-      histogram(of),
-      calibration(of),
-      autocorrelation(of),
-      spectrum(of)};
+  return {scatter(of, "Residuals over the first input", with_unit(record.input_name), record.input),
+          scatter(of, "Residuals over the rate of the first input", rate_label(record.input_name),
+                  rate_of(record.input, of.rate_Hz)),
+          scatter(of, "Residuals over the target", with_unit(record.target->name),
+                  record.target->values),
+          scatter(of, "Residuals over time", "time [s]", time_s),
+          histogram(of),
+          calibration(of),
+          autocorrelation(of),
+          spectrum(of)};
 }
 
 }  // namespace torsio

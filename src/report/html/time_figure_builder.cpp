@@ -3,9 +3,32 @@
 #include <algorithm>
 #include <cmath>
 
+#include "torsio/control/joint_cascade.hpp"
+#include "torsio/core/fault.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/safety/monitor.hpp"
 
 namespace torsio {
+namespace {
+
+/// The names of an enumeration up to its last value.
+template <class Value>
+std::vector<std::string> names_up_to(Value last) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k <= static_cast<std::size_t>(last); ++k)
+    names.emplace_back(name(static_cast<Value>(k)));
+  return names;
+}
+
+/// The names of the numbers of a channel that contains faults, states or limits; empty: of another one.
+std::vector<std::string> value_names_of(const std::string& channel) {
+  if (channel.ends_with("fault_1")) return names_up_to(static_cast<Fault>(kFaultCount - 1));
+  if (channel == "monitor_state_1") return names_up_to(Monitor::State::stopped);
+  if (channel == "limit_1") return names_up_to(JointCascade::Limit::voltage);
+  return {};
+}
+
+}  // namespace
 
 std::size_t values_of_figure(std::size_t samples) noexcept {
   constexpr std::size_t kLong = 1'000'000;
@@ -68,6 +91,7 @@ void TimeFigureBuilder::add_channels(const Recording& recording,
         [&](const TimeFigure::Panel& panel) { return panel.label == label; });
     if (known == figure_.panels.end()) {
       panel(label);
+      figure_.panels.back().value_names = value_names_of(channel.name);
       add(channel.name, CurveRole::model, is_shown, channel.values);
     } else {
       known->series.push_back({.label = channel.name,

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "control/design/loop_design.hpp"
 #include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "sim/bench/bench.hpp"
@@ -339,6 +340,15 @@ void run_into(TrackingRow& row, const DataSheet& sheet, const TrackingSpec& spec
 }
 
 }  // namespace
+
+LinearSystem open_torque_loop(const DataSheet& nominal, const TrackingSpec& spec) {
+  if (spec.actuation != DeflectionController::Actuation::current)
+    throw UsageError({.place = kPlace,
+                      .expected = "a deflection controller that acts on the current",
+                      .found = "one that acts on the speed"});
+  const TorqueLoopCore core(loop_settings(nominal, spec, load_of(spec)), kBenchRate_Hz);
+  return open_loop(core.deflection().settings().joint, core.feedback(), spec.output);
+}
 
 void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed) {
   if (nominal.family != ActuatorFamily::series_elastic)

@@ -10,6 +10,7 @@
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/wear.hpp"
+#include "torsio/control/design/linear_system.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
@@ -94,6 +95,10 @@ struct TrackingSpec {
   OperatingConditions conditions = {};
   FaultSchedule faults = {};
 };
+
+/// The torque loop of a run, cut open at the current, in its linear range.
+/// @throws UsageError if the deflection controller acts on the speed; Error as `check_tracking`.
+[[nodiscard]] LinearSystem open_torque_loop(const DataSheet& nominal, const TrackingSpec& spec);
 
 /// Checks a run. @throws UsageError if the actuator is not series-elastic, the reference exceeds
 /// its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be
