@@ -140,3 +140,27 @@ def test_an_adaptation_takes_settings_and_test_recordings(bench):
     for arguments, message in [({"method": "magic"}, "magic"), ({"stepsize": 1}, "stepsize")]:
         with pytest.raises(torsio.UsageError, match=message):
             torsio.adapt(model, folder / "b.csv", **arguments)
+
+
+@needs_program
+def test_a_simulated_joint_that_its_monitor_stops_is_that_of_the_program(bench):
+    folder, _ = bench
+    sources = {
+        "spring": torsio.MonitorSource(folder / "spring.safetensors", ["gear_encoder", "joint_encoder"]),
+        "current": torsio.MonitorSource(folder / "current.safetensors", ["current_sensor"]),
+    }
+    logs = [folder / "b.csv", folder / "c.csv"]
+    torsio.calibrate_monitor(
+        folder / "dfki.monitor.json", logs, sources, serial="dfki-50", false_alarms_per_hour=200.0
+    )
+    mine = torsio.monitor_simulated(
+        "dfki-50", folder / "dfki.monitor.json", faults=["gear_angle=5deg@3s"], duration_s=6.0, seed=2
+    )
+    theirs = document(
+        folder, "monitor", "dfki.monitor.json", "--actuator", "dfki-50", "--inject", "gear_angle=5deg@3s", "--duration",
+        "6s", "--seed", "2",
+    )  # fmt: skip
+    assert mine.document == theirs
+    [recording] = mine.document["recordings"]
+    assert recording["injections"][0]["start_s"] == 3.0
+    assert len(mine.torques[0]) == 6000

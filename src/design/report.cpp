@@ -51,13 +51,17 @@ std::vector<DesignFigure> columns_of(const DesignTable& table) {
   return found == table.rows.end() ? std::vector<DesignFigure>() : found->figures;
 }
 
+/// A name for a page: words instead of a key.
+std::string words_of(std::string name) {
+  std::ranges::replace(name, '_', ' ');
+  return name;
+}
+
 std::vector<std::string> headings_of(const DesignTable& table) {
   std::vector<std::string> headings{table.row_name, "choice"};
-  for (const DesignFigure& column : columns_of(table)) {
-    std::string heading = column.name;
-    std::ranges::replace(heading, '_', ' ');
-    headings.push_back(heading + (column.unit.empty() ? "" : " [" + column.unit + "]"));
-  }
+  for (const DesignFigure& column : columns_of(table))
+    headings.push_back(words_of(column.name) +
+                       (column.unit.empty() ? "" : " [" + column.unit + "]"));
   return headings;
 }
 
@@ -202,12 +206,10 @@ ReportDocument design_page(const DesignReport& report) {
   for (const DesignSection& section : report.sections) {
     ReportTable table{.headings = {"quantity", "value", "unit", "remark"}, .rows = {}};
     for (const DesignFigure& figure : section.figures)
-      table.rows.push_back(
-          {.cells = {figure.name, figure.text.empty() ? number(figure.value) : figure.text,
-                     figure.unit, figure.remark}});
-    std::string heading = section.name;
-    std::ranges::replace(heading, '_', ' ');
-    page.sections.push_back({.heading = std::move(heading), .tables = {std::move(table)}});
+      table.rows.push_back({.cells = {words_of(figure.name),
+                                      figure.text.empty() ? number(figure.value) : figure.text,
+                                      figure.unit, figure.remark}});
+    page.sections.push_back({.heading = words_of(section.name), .tables = {std::move(table)}});
   }
   return page;
 }

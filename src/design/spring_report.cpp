@@ -83,6 +83,11 @@ DesignReport spring_report(const SpringDemand& d, const SpringDesign& design,
         {"material", kNotMeasured, "", d.material.source, d.material.name},
         {"allowed_shear", d.material.allowed_shear_Pa / d.safety * 1e-6, "MPa"}}});
   if (!kinds.empty()) report.tables.push_back(kinds_table(d, design, kinds));
+  const auto discs = std::ranges::find(kinds, SpringKind::discs, &SpringDesign::kind);
+  if (discs != kinds.end() && discs->is_feasible)
+    report.notes.emplace_back(
+        "The stress of discs is the compressive one at the middle of their section (sigma_OM), the "
+        "others are shear stresses.");
   if (!design.is_feasible) return report;
   DesignSection section = design.dimensions;
   section.figures.insert(section.figures.begin(), DesignFigure{"kind", kNotMeasured, "", "",

@@ -241,7 +241,8 @@ void add_monitor(CLI::App& app) {
           "--actuator", simulated.actuators,
           "a simulated joint at work in place of recordings; with --campaign and --accuracy "
           "several, separated by commas (default: one of each)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   verb->add_option(
       "--monitors", simulated.monitors,
       "folder with the monitors of simulated joints; one that is missing is calibrated and "
