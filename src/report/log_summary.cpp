@@ -28,6 +28,7 @@ std::string fresh_text(const ColumnSummary& column, const LogSummary& summary) {
   if (column.fresh == 1) return "constant";
   const auto values = static_cast<double>(column.fresh - 1);
   if (summary.duration_s > 0.0) return fmt::format("{:.4g} Hz", values / summary.duration_s);
+  if (column.fresh == summary.rows) return "every row";
   return fmt::format("1 in {:.3g} rows", static_cast<double>(summary.rows - 1) / values);
 }
 

@@ -31,6 +31,8 @@ std::string question(const torsio::ColumnGuess& guess) {
                                  guess.summary.lowest, guess.summary.highest);
   for (const std::string& reason : guess.reasons) text += "\n  " + reason;
   if (!guess.missing.empty()) text += "\n  not shown by the data: " + guess.missing;
+  if (guess.channel.empty())
+    return text + "\n  No guess. Enter: none; CHANNEL_UNIT such as joint_angle_deg > ";
   return text + fmt::format(
                     "\n  {} in {}? Enter: yes{}; CHANNEL_UNIT such as joint_angle_deg; "
                     "-: none > ",
@@ -39,7 +41,7 @@ std::string question(const torsio::ColumnGuess& guess) {
 }
 
 /// Asks until the answer is one; the end of the input takes the guesses as they are.
-/// @returns whether the input goes on
+/// @returns whether the input continues
 bool ask(torsio::MappingDraft& draft, std::size_t column) {
   std::string line;
   for (;;) {
@@ -55,10 +57,16 @@ bool ask(torsio::MappingDraft& draft, std::size_t column) {
 }
 
 void ask_for_unsure(torsio::MappingDraft& draft) {
+  constexpr std::size_t kMaxOpenQuestions = 8;
+  std::size_t questions = 0;
   for (std::size_t i = 0; i < draft.columns.size(); ++i) {
     const torsio::ColumnGuess& guess = draft.columns[i];
     const bool is_unsure = guess.certainty == torsio::Certainty::unsure || !guess.missing.empty();
-    if (is_unsure && !guess.channel.empty() && !ask(draft, i)) return;
+    // Where something is missing, a column without a guess may be it.
+    const bool may_be_missing = guess.channel.empty() && guess.summary.fresh > 1 &&
+                                !draft.remarks.empty() && questions < kMaxOpenQuestions;
+    if (may_be_missing) ++questions;
+    if (((is_unsure && !guess.channel.empty()) || may_be_missing) && !ask(draft, i)) return;
   }
 }
 
@@ -89,7 +97,7 @@ void run(MapFlags& flags) {
   torsio::try_draft(table, draft);
   show(flags, torsio::mapping_draft_text(draft));
   if (const std::size_t unsure = unsure_guesses(draft); unsure > 0)
-    remark(fmt::format("{} guesses are unsure: confirm them in the draft before a model is trained",
+    remark(fmt::format("unsure guesses, to be confirmed in the draft before a model is trained: {}",
                        unsure));
   flags.json.write(torsio::mapping_draft_json(draft));
   if (!flags.output.empty()) {

@@ -75,7 +75,7 @@ std::optional<GearFit> fit_gear(const std::vector<double>& motor, const std::vec
 }
 
 double plausible_ratio(const GearFit& fit) {
-  constexpr double kNear = 0.005;
+  constexpr double kNear = 0.003;
   constexpr double kErrors = 3.0;
   const double ratio = std::abs(fit.factor);
   const double whole = std::round(ratio);

@@ -28,7 +28,9 @@ void guess_clock(DraftWork& work);       ///< by name, unit and rising values
 void guess_quantities(DraftWork& work);  ///< by name and unit
 void guess_units(DraftWork& work);       ///< by logger, values, and speeds that are derivatives
 void guess_gear(DraftWork& work);        ///< sides, ratio and signs by the relation of the angles
-void guess_held(DraftWork& work);        ///< masks, and sensors that are slower than the log
-void settle_twins(DraftWork& work);      ///< one column for each channel
+void guess_sides_of_speeds(DraftWork& work);  ///< by the angle that each is the derivative of
+void guess_held(DraftWork& work);             ///< masks, and sensors that are slower than the log
+void settle_torques(DraftWork& work);         ///< the one of a sensor is that of the spring
+void settle_twins(DraftWork& work);           ///< one column for each channel
 
 }  // namespace torsio

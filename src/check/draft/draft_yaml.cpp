@@ -51,11 +51,14 @@ std::string others_text(const MappingDraft& draft) {
 
 std::string ColumnGuess::rule() const {
   std::string rule = fmt::format("{}: {{from: {}", channel, yaml_name(summary.name));
-  if (unit.empty() && channel != "t_s") rule += ", unit: UNIT";
+  const bool is_unknown = unit.empty() && summary.unit_origin != UnitOrigin::dates;
+  if (is_unknown && scale.empty()) rule += ", unit: UNIT";
+  if (is_unknown && !scale.empty()) rule += ", " + scale;
   if (!unit.empty() && summary.unit_origin != UnitOrigin::dates)
     rule += fmt::format(", unit: {}", unit == "1" ? "\"1\"" : unit);
   if (sign < 0.0) rule += ", sign: -1";
   if (gear_ratio != 1.0) rule += fmt::format(", gear_ratio: {:.6g}", gear_ratio);
+  if (unwrap > 0.0) rule += fmt::format(", unwrap: {:.0f}", unwrap);
   return rule + "}";
 }
 

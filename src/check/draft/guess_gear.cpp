@@ -17,7 +17,8 @@ constexpr double kMovesTogether = 0.5;  ///< share of the variance below which n
 constexpr double kMovesMuch = 0.99;
 constexpr double kByTorque = 0.1;  ///< share of what is left that shows the torque's sign
 constexpr double kLargestRatio = 400.0;
-constexpr double kSameSide = 0.1;  ///< a ratio that differs less from 1 is none
+constexpr double kLeastRatio = 1.5;  ///< for an angle that is named after the gear
+constexpr double kSameSide = 0.1;    ///< a ratio that differs less from 1 is none
 
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
@@ -85,14 +86,16 @@ Angles angles_by_width(DraftWork& work, Angles angles) {
 
 /// The unit of the motor's angle in which the ratio is one that gears have; the present one otherwise.
 std::string_view unit_by_ratio(const ColumnGuess& motor, double factor) {
-  if (motor.certainty >= Certainty::likely) return motor.unit;
+  if (!motor.is_unit_by_range) return motor.unit;
   const double now = find_unit(motor.unit)->scale;
+  std::vector<std::string_view> possible;
   for (const std::string_view unit : {"rad", "deg", "rev"}) {
     const double ratio = std::abs(factor) * find_unit(unit)->scale / now;
-    const bool is_whole = std::abs(ratio - std::round(ratio)) < 0.01 * ratio;
-    if (is_whole && ratio > 0.99 && ratio < kLargestRatio) return unit;
+    if (ratio < 0.95 || ratio > kLargestRatio) continue;
+    if (std::abs(ratio - std::round(ratio)) < 0.003 * ratio) return unit;
+    possible.push_back(unit);
   }
-  return motor.unit;
+  return possible.size() == 1 ? possible.front() : std::string_view(motor.unit);
 }
 
 Certainty certainty_of(const GearFit& fit, double ratio) {
@@ -116,11 +119,13 @@ void take_ratio(DraftWork& work, const Angles& angles, GearFit fit) {
   if (fit.factor < 0.0) motor.sign = -motor.sign;
   std::string reason =
       fmt::format("relation: {:.5g} +- {:.1g} times '{}'", fit.factor, fit.error, joint);
+  const bool is_after_gear = work.readings[angles.before].side == Side::gear &&
+                             !(ratio >= kLeastRatio && ratio == std::round(ratio));
   motor.channel = "gear_angle_rad";
   work.readings[angles.before].side = Side::gear;
-  if (std::abs(ratio - 1.0) < kSameSide) {
+  if (is_after_gear || std::abs(ratio - 1.0) < kSameSide) {
     motor.add(fit.explained > kMovesMuch ? Certainty::sure : Certainty::likely,
-              reason + ", so that it is after the gear");
+              is_after_gear ? reason : reason + ", so that it is after the gear");
   } else if (ratio < 1.0 || ratio > kLargestRatio) {
     motor.add(Certainty::unsure, reason);
     motor.missing = "the gear ratio: check the units of both angles";

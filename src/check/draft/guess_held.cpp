@@ -67,6 +67,7 @@ void guess_held(DraftWork& work) {
     guess_mask(work, i);
     ++masks;
   }
+  if (!work.table.has_units) return;  // messages hold their last value
   for (std::size_t i = 0; i < work.size(); ++i) {
     ColumnGuess& guess = work.draft.columns[i];
     const bool has_mask =
@@ -82,6 +83,20 @@ void guess_held(DraftWork& work) {
       guess.holds = true;
       guess.reasons.push_back(fmt::format("values: held over {} rows: a slower sensor", rows));
     }
+  }
+}
+
+void settle_torques(DraftWork& work) {
+  const std::vector<std::size_t> torques = work.measured(Quantity::torque);
+  const auto is_sensor = [&](std::size_t i) { return work.readings[i].is_sensor; };
+  const auto sensor = std::ranges::find_if(torques, is_sensor);
+  if (sensor == torques.end()) return;
+  for (const std::size_t i : torques) {
+    ColumnGuess& guess = work.draft.columns[i];
+    if (is_sensor(i) || guess.channel != "torque_Nm") continue;
+    guess.certainty = Certainty::unsure;
+    guess.missing = fmt::format("which torque it is: '{}' is that of a sensor",
+                                work.draft.columns[*sensor].summary.name);
   }
 }
 

@@ -21,6 +21,14 @@ struct UnitOfStep {
 constexpr auto kUnitsOfSteps =
     std::to_array<UnitOfStep>({{0.05, "s"}, {50.0, "ms"}, {5e4, "us"}, {5e7, "ns"}});
 
+constexpr double kCounterSpan = 4294967296.0;  ///< 2^32
+
+bool wraps(const std::vector<double>& stamps) {
+  for (std::size_t i = 1; i < stamps.size(); ++i)
+    if (stamps[i] < stamps[i - 1] - kCounterSpan / 2.0) return true;
+  return false;
+}
+
 std::string reason_of_unit(const ColumnSummary& summary) {
   return fmt::format("unit: {} ({})", summary.unit, name(summary.unit_origin));
 }
@@ -53,7 +61,8 @@ int score_of_clock(const LogColumn& column, const ColumnSummary& summary,
   if (unit != nullptr && unit->si_suffix != "s") return 0;
   const bool is_time = reading.quantity == Quantity::time || unit != nullptr;
   const bool has_order = is_rising(column.values);
-  if (!has_order && !(is_time && reading.is_clear)) return 0;
+  const bool is_named = is_time && (reading.is_clear || unit != nullptr || wraps(column.values));
+  if (!has_order && !is_named) return 0;
   if (is_time && has_order) return unit != nullptr ? 7 : reading.is_clear ? 6 : 4;
   if (is_time) return 2;  // it starts again, or rows come late
   return reading.quantity == Quantity::unknown ? 1 : 0;
@@ -75,7 +84,18 @@ void take_as_clock(DraftWork& work, std::size_t column, int score) {
   const double step = usual_step(work.values(column));
   state_unit_of_clock(guess, reading, step);
   const Unit* const unit = find_unit(guess.unit);
-  if (unit != nullptr && step > 0.0) work.draft.rate_Hz = 1.0 / (step * unit->scale);
+  const std::vector<double>& stamps = work.values(column);
+  const double span = stamps.back() - stamps.front();
+  const double scale = work.table.columns[column].time != TimeKind::none ? 1.0
+                       : unit != nullptr                                 ? unit->scale
+                                                                         : 0.0;
+  if (span * scale > 0.0)
+    work.draft.rate_Hz = static_cast<double>(stamps.size() - 1) / (span * scale);
+  if (wraps(stamps)) {
+    guess.unwrap = kCounterSpan;
+    guess.add(Certainty::likely, "values: a counter of 32 bits begins again");
+    if (unit != nullptr && step > 0.0) work.draft.rate_Hz = 1.0 / (step * unit->scale);
+  }
   if (unit == nullptr) guess.missing = "the unit of the time: set unit: s, ms, us or ns";
 }
 
@@ -85,6 +105,12 @@ Quantity by_unit(const NameReading& reading, const Unit& unit) {
   return quantity_of_unit(unit.si_suffix);
 }
 
+/// Whether a unit alone makes a channel likely; a voltage may be one of many.
+bool shows_channel(Quantity quantity) {
+  return quantity == Quantity::angle || quantity == Quantity::torque ||
+         quantity == Quantity::deflection;
+}
+
 void guess_one(ColumnGuess& guess, NameReading& reading) {
   const Unit* const unit = find_unit(guess.summary.unit);
   if (unit != nullptr) {
@@ -92,6 +118,8 @@ void guess_one(ColumnGuess& guess, NameReading& reading) {
     reading.quantity = by_unit(reading, *unit);
     if (reading.quantity != named && reading.quantity != Quantity::unknown) reading.is_clear = true;
   }
+  const bool is_by_unit_alone = reading.word.empty() && reading.side == Side::unknown;
+  if (is_by_unit_alone && !shows_channel(reading.quantity)) return;
   const std::string channel = channel_of(reading.quantity, reading.side, reading.is_goal);
   if (channel.empty() || reading.quantity == Quantity::time) return;
   guess.channel = fmt::format("{}_{}", channel, si_unit_of(reading.quantity));

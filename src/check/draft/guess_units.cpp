@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <numbers>
 
@@ -33,6 +34,14 @@ bool is_ros(std::string_view column) {
   return column.starts_with('/') && column.find('/', 1) != std::string_view::npos;
 }
 
+/// "ActPos[mdeg]"; a number there may be an index.
+bool has_unknown_brackets(std::string_view column) {
+  if (column.empty() || (column.back() != ']' && column.back() != ')')) return false;
+  const auto open = column.find_last_of(column.back() == ']' ? '[' : '(');
+  return open != std::string_view::npos && open > 0 &&
+         std::isdigit(static_cast<unsigned char>(column[open + 1])) == 0;
+}
+
 const Logger* logger_of(const LogTable& table) {
   const auto has = [&](std::string_view part) {
     return std::ranges::any_of(table.columns, [&](const LogColumn& column) {
@@ -53,6 +62,13 @@ void take_unit(ColumnGuess& guess, std::string_view unit, Certainty at_most, std
   guess.add(at_most, std::move(reason));
 }
 
+/// What the user has to complete.
+std::string scale_of_counts(Quantity quantity) {
+  if (quantity == Quantity::angle || quantity == Quantity::deflection)
+    return "unit: rev, scale: 1/COUNTS";
+  return fmt::format("unit: {}, scale: FACTOR", si_unit_of(quantity));
+}
+
 /// Whole numbers over more than a revolution of any other unit, or the word itself.
 bool is_counted(const std::vector<double>& values, const ColumnSummary& summary,
                 const NameReading& reading) {
@@ -63,6 +79,7 @@ bool is_counted(const std::vector<double>& values, const ColumnSummary& summary,
 
 /// By the range: a joint does not turn by ten revolutions, nor by less than a degree.
 void guess_angle(ColumnGuess& guess, const NameReading& reading) {
+  guess.is_unit_by_range = true;
   const double width = guess.summary.highest - guess.summary.lowest;
   const double size = size_of(guess.summary);
   const bool is_motor = reading.side == Side::motor;
@@ -90,6 +107,7 @@ void guess_by_values(ColumnGuess& guess, const NameReading& reading,
   };
   if (is_counted(values, guess.summary, reading) && reading.quantity != Quantity::mask) {
     guess.missing = "whole numbers: the size of one, with unit: and scale:";
+    guess.scale = scale_of_counts(reading.quantity);
     guess.add(Certainty::unsure, "values: counts");
     return;
   }
@@ -150,7 +168,37 @@ void compare_with_angle(DraftWork& work, std::size_t speed) {
   }
 }
 
+/// What a column was before its gear.
+Side side_of_angle(const ColumnGuess& angle, const NameReading& reading) {
+  return angle.gear_ratio != 1.0 ? Side::motor : reading.side;
+}
+
+void guess_side_of_speed(DraftWork& work, std::size_t speed) {
+  constexpr double kNear = 0.06;
+  ColumnGuess& guess = work.draft.columns[speed];
+  for (const std::size_t angle : work.measured(Quantity::angle)) {
+    const ColumnGuess& of_angle = work.draft.columns[angle];
+    const auto found =
+        factor_of_rate(work.si_values(speed), work.si_values(angle), work.draft.rate_Hz);
+    if (!found || std::abs(std::abs(found->factor) - 1.0) > kNear) continue;
+    const Side side = side_of_angle(of_angle, work.readings[angle]);
+    work.readings[speed].side = side;
+    guess.channel = channel_of(Quantity::speed, side, false) + "_rad_s";
+    if (found->factor < 0.0) guess.sign = -guess.sign;
+    guess.add(found->factor < 0.0 ? Certainty::unsure : Certainty::likely,
+              fmt::format("relation: the derivative of '{}'{}", of_angle.summary.name,
+                          found->factor < 0.0 ? " with the opposite sign" : ""));
+    return;
+  }
+}
+
 }  // namespace
+
+void guess_sides_of_speeds(DraftWork& work) {
+  if (work.draft.rate_Hz <= 0.0) return;
+  for (const std::size_t speed : work.measured(Quantity::speed))
+    if (work.readings[speed].side == Side::unknown) guess_side_of_speed(work, speed);
+}
 
 void guess_units(DraftWork& work) {
   const Logger* const logger = logger_of(work.table);
@@ -163,6 +211,10 @@ void guess_units(DraftWork& work) {
     const Unit* const word = find_unit(reading.unit);
     if (guess.summary.measured == 0) {
       guess.missing = "it has no numbers";
+    } else if (has_unknown_brackets(guess.summary.name)) {
+      guess.missing = "the size of the unit in its brackets, with unit: and scale:";
+      guess.scale = scale_of_counts(reading.quantity);
+      guess.add(Certainty::unsure, "unit: in brackets, not known");
     } else if (word != nullptr && word->si_suffix == si) {
       take_unit(guess, word->suffix, Certainty::likely,
                 fmt::format("unit: {} (word in the name)", word->suffix));

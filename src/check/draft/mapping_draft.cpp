@@ -52,13 +52,15 @@ void require_motion(const LogTable& table, const MappingDraft& draft) {
                .advice = "Record while the joint moves, or name the right file."});
 }
 
-/// Columns of a name with a unit that cannot be read must be left out by name.
-std::vector<std::string> dropped_names(const LogTable& table) {
-  std::vector<std::string> names;
-  for (const std::string& left_out : table.not_read)
-    if (const auto at = left_out.rfind(" ("); at != std::string::npos)
-      names.push_back(left_out.substr(0, at));
-  return names;
+/// Columns that cannot be read would be, because of the units in their names: they must be left out by name.
+void drop_unreadable(const LogTable& table, MappingDraft& draft) {
+  for (const std::string& left_out : table.not_read) {
+    const std::string name = left_out.substr(0, left_out.rfind(" ("));
+    if (split_channel_name(name)) draft.dropped.push_back(name);
+    for (ColumnGuess& guess : draft.columns)
+      if (guess.summary.name == name)
+        guess.missing = "two columns have this name: rename one of them in the file";
+  }
 }
 
 /// @returns whether a recording can be read with this clock
@@ -74,6 +76,23 @@ bool is_read_with(const LogTable& table, MappingDraft& draft) {
     draft.refusal = error.what();
     return true;  // another clock does not help
   }
+}
+
+/// What `torsio check` needs besides.
+void add_remarks(MappingDraft& draft) {
+  if (draft.of("torque_Nm") == nullptr)
+    draft.remarks.emplace_back(
+        "no column is the torque of the spring (torque_Nm), the target of a model: name it, or "
+        "compute it from a known load (--load)");
+  const bool has_joint = draft.of("joint_angle_rad") != nullptr;
+  if (draft.of("spring_deflection_rad") != nullptr ||
+      (draft.of("gear_angle_rad") != nullptr && has_joint))
+    return;
+  draft.remarks.emplace_back(
+      std::string("no deflection: it is gear_angle_rad - joint_angle_rad; ") +
+      (has_joint ? "name the angle spring_deflection_rad if the other side is clamped, or add "
+                   "--inputs joint_angle_rad"
+                 : "name other inputs with --inputs"));
 }
 
 }  // namespace
@@ -126,28 +145,26 @@ MappingDraft draft_mapping(const LogTable& table) {
     work.draft.columns.push_back({.summary = std::move(summary)});
   }
   work.draft.not_read = table.not_read;
-  work.draft.dropped = dropped_names(table);
   guess_clock(work);
   require_motion(table, work.draft);
   guess_quantities(work);
   guess_units(work);
+  settle_torques(work);
   guess_gear(work);
+  guess_sides_of_speeds(work);
   settle_twins(work);
   guess_held(work);
-  if (work.draft.of("torque_Nm") == nullptr)
-    work.draft.remarks.emplace_back(
-        "no column is the torque of the spring (torque_Nm), the target of a model: name it, or "
-        "compute it from a known load (--load)");
-  if (work.draft.of("spring_deflection_rad") == nullptr &&
-      (work.draft.of("gear_angle_rad") == nullptr || work.draft.of("joint_angle_rad") == nullptr))
-    work.draft.remarks.emplace_back(
-        "no deflection: it follows from gear_angle_rad and joint_angle_rad, or name other inputs "
-        "with --inputs");
+  drop_unreadable(table, work.draft);
+  add_remarks(work.draft);
   return std::move(work.draft);
 }
 
 void try_draft(const LogTable& table, MappingDraft& draft) {
   draft.clock.clear();
+  if (std::ranges::none_of(draft.columns, &ColumnGuess::is_written)) {
+    draft.refusal = "no column was recognised: write channels: by hand";
+    return;
+  }
   if (is_read_with(table, draft)) return;
   const std::string even = draft.refusal;
   draft.clock = "{rebuild: true}";

@@ -23,10 +23,13 @@ enum class Certainty : std::uint8_t {
 /// What a column of a log is taken for.
 struct ColumnGuess {
   ColumnSummary summary = {};
-  std::string channel = {};  ///< with its SI unit; empty: none
-  std::string unit = {};     ///< suffix of the unit of the numbers; empty: not known
+  std::string channel = {};       ///< with its SI unit; empty: none
+  std::string unit = {};          ///< suffix of the unit of the numbers; empty: not known
+  bool is_unit_by_range = false;  ///< its unit is a guess from the range of the numbers
   double sign = 1.0;
   double gear_ratio = 1.0;
+  std::string scale = {};    ///< for the user to complete: "unit: rev, scale: 1/COUNTS"
+  double unwrap = 0.0;       ///< the span after which a counter begins again; 0: none
   bool holds = false;        ///< slower than the log
   std::string missing = {};  ///< what the data do not show: the rule is only a comment
   Certainty certainty = Certainty::none;

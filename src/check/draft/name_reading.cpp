@@ -56,6 +56,8 @@ constexpr auto kQuantityWords = std::to_array<QuantityWord>({
     {"verdrehung", Quantity::deflection},
     {"torque", Quantity::torque},
     {"trq", Quantity::torque},
+    {"tq", Quantity::torque},
+    {"messwelle", Quantity::torque},
     {"tau", Quantity::torque},
     {"moment", Quantity::torque},
     {"drehmoment", Quantity::torque},
@@ -116,6 +118,9 @@ constexpr auto kGoalWords = std::to_array<std::string_view>(
     {"cmd", "command", "commanded", "goal", "target", "ref", "reference", "desired", "des",
      "setpoint", "soll", "sollwert", "wanted", "demand", "sp"});
 
+constexpr auto kSensorWords = std::to_array<std::string_view>(
+    {"sensor", "loadcell", "cell", "meas", "measured", "transducer", "ft", "messwelle"});
+
 constexpr auto kUnitWords = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"deg", "deg"},     {"degree", "deg"},   {"degrees", "deg"}, {"rad", "rad"},
     {"radians", "rad"}, {"turns", "rev"},    {"turn", "rev"},    {"rev", "rev"},
@@ -153,29 +158,60 @@ std::vector<std::string> words_of(std::string_view name) {
   return words;
 }
 
+/// "i_q" and "q_current" are currents in the axes of the rotor; that of the d axis makes no torque.
+void join_axes(std::vector<std::string>& words) {
+  for (std::size_t k = 0; k + 1 < words.size(); ++k) {
+    const bool is_current = words[k] == "i" && (words[k + 1] == "q" || words[k + 1] == "d");
+    const bool is_idle = words[k] == "d" && words[k + 1] == "current";
+    if (!is_current && !is_idle) continue;
+    words[k] = is_idle ? "id" : "i" + words[k + 1];
+    words.erase(words.begin() + static_cast<std::ptrdiff_t>(k) + 1);
+  }
+}
+
 bool is_one_of(std::span<const std::string_view> words, std::string_view word) {
   return std::ranges::find(words, word) != words.end();
+}
+
+/// A word that contains one, as "motorstrom" does; short ones would be found by chance.
+const QuantityWord* contained_quantity(std::string_view word) {
+  constexpr std::size_t kLeastLetters = 5;
+  const auto* const at = std::ranges::find_if(kQuantityWords, [&](const QuantityWord& each) {
+    return each.word.size() >= kLeastLetters && word.find(each.word) != std::string_view::npos;
+  });
+  return at == kQuantityWords.end() ? nullptr : at;
 }
 
 /// The last word that names one, as "torque sensor temperature" is a temperature; a clear one before a letter.
 const QuantityWord* quantity_word(const std::vector<std::string>& words) {
   const QuantityWord* found = nullptr;
   for (const std::string& word : words) {
-    const auto* const at = std::ranges::find(kQuantityWords, word, &QuantityWord::word);
+    const auto* at = std::ranges::find(kQuantityWords, word, &QuantityWord::word);
+    if (at == kQuantityWords.end() && word.size() > 3 && word.ends_with('s'))  // "torques"
+      at = std::ranges::find(kQuantityWords, std::string_view(word).substr(0, word.size() - 1),
+                             &QuantityWord::word);
     if (at == kQuantityWords.end()) continue;
     const bool is_weaker = found != nullptr && found->is_clear && !at->is_clear;
     if (!is_weaker) found = at;
   }
+  for (std::size_t i = words.size(); i-- > 0 && found == nullptr;)
+    found = contained_quantity(words[i]);
   return found;
 }
 
+/// The last word that names one: "/joint_states/elbow_motor/position" is of the motor.
 Side side_of(const std::vector<std::string>& words) {
+  Side side = Side::unknown;
   for (const std::string& word : words)
     if (const auto* const at =
             std::ranges::find(kSideWords, word, &std::pair<std::string_view, Side>::first);
         at != kSideWords.end())
-      return at->second;
-  return Side::unknown;
+      side = at->second;
+  for (const std::string& word : words)
+    for (const std::string_view part : {"motor", "gelenk", "abtrieb"})
+      if (side == Side::unknown && word.find(part) != std::string::npos)
+        side = part == "motor" ? Side::motor : Side::joint;
+  return side;
 }
 
 bool has_word(const std::vector<std::string>& words, std::string_view word) {
@@ -210,7 +246,8 @@ void combine(const std::vector<std::string>& words, NameReading& reading) {
 }  // namespace
 
 NameReading read_name(std::string_view name) {
-  const std::vector<std::string> words = words_of(name);
+  std::vector<std::string> words = words_of(name);
+  join_axes(words);
   NameReading reading{.side = side_of(words)};
   if (const QuantityWord* const word = quantity_word(words); word != nullptr) {
     reading.quantity = word->quantity;
@@ -220,6 +257,7 @@ NameReading read_name(std::string_view name) {
   combine(words, reading);
   for (const std::string& word : words) {
     reading.is_goal = reading.is_goal || is_one_of(kGoalWords, word);
+    reading.is_sensor = reading.is_sensor || is_one_of(kSensorWords, word);
     reading.is_counted = reading.is_counted || is_one_of(kCountWords, word);
     if (std::isdigit(static_cast<unsigned char>(word.front())) != 0) reading.number = word;
     if (const auto* const unit = std::ranges::find(

@@ -31,10 +31,11 @@ enum class Side : std::uint8_t { unknown, motor, gear, joint };
 struct NameReading {
   Quantity quantity = Quantity::unknown;
   Side side = Side::unknown;
-  bool is_goal = false;   ///< commanded, not measured
-  bool is_clear = false;  ///< by a word, not by a single letter
-  std::string word = {};  ///< that shows the quantity
-  std::string unit = {};  ///< suffix of a unit that the name has as a word ("PosDeg"); empty: none
+  bool is_goal = false;    ///< commanded, not measured
+  bool is_clear = false;   ///< by a word, not by a single letter
+  std::string word = {};   ///< that shows the quantity
+  std::string unit = {};   ///< suffix of a unit that the name has as a word ("PosDeg"); empty: none
+  bool is_sensor = false;  ///< measured, not computed by a controller
   bool is_counted = false;  ///< in counts, whose size the name does not state
   std::string number = {};  ///< digits in the name: which of several joints or sensors
 };

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <chrono>
 #include <cstddef>
 #include <ctime>
+#include <system_error>
 #include <vector>
 
 #include "core/text_cursor.hpp"
@@ -213,11 +215,31 @@ std::optional<TimeStamp> read_days(std::string_view text) {
   return TimeStamp{.kind = TimeKind::time_of_day, .time_s = kDay_s * days + *time};
 }
 
+/// "0.002 sec", as MATLAB writes durations in tables.
+std::optional<TimeStamp> read_duration(std::string_view text) {
+  struct Ending {
+    std::string_view ending;
+    double unit_s;
+  };
+  constexpr auto kEndings =
+      std::to_array<Ending>({{" sec", 1.0}, {" min", kMinute_s}, {" hr", kHour_s}});
+  for (const auto& [ending, unit_s] : kEndings) {
+    if (!text.ends_with(ending)) continue;
+    double number = 0.0;
+    const char* const end = text.data() + text.size() - ending.size();
+    const auto [after, code] = std::from_chars(text.data(), end, number);
+    if (code != std::errc{} || after != end) return std::nullopt;
+    return TimeStamp{.kind = TimeKind::time_of_day, .time_s = unit_s * number};
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<TimeStamp> read_time_stamp(std::string_view text) {
   const std::string_view whole = trimmed(text);
   if (whole.empty() || !is_digit(whole.front())) return std::nullopt;
+  if (const auto duration = read_duration(whole)) return duration;
   if (const auto duration = read_days(whole)) return duration;
   TimeText parts(whole);
   const auto days = take_date(parts);
