@@ -28,8 +28,13 @@ TubeImpedance::Settings checked(const TubeImpedance::Settings& settings) {
   return settings;
 }
 
-double gear_ratio_of(const TubeImpedance::Settings& settings) {
+double gear_ratio_of(const TubeImpedance::Settings& settings) noexcept {
   return settings.drive.ratio / settings.tube_ratio;
+}
+
+double torque_per_twist_of(const TubeImpedance::Settings& settings, double torque_Nm_rad) noexcept {
+  return gear_ratio_of(settings) * settings.tube_Nm_rad * torque_Nm_rad /
+         (torque_Nm_rad + settings.tube_Nm_rad / settings.tube_ratio);
 }
 
 }  // namespace
@@ -39,8 +44,7 @@ TubeImpedance::Gains TubeImpedance::gains_for(const Settings& settings, double s
   require_positive(kPlace, "torque gain", torque_Nm_rad);
   require_not_negative(kPlace, "stiffness_Nm_rad", stiffness_Nm_rad);
   require_not_negative(kPlace, "damping_Nms_rad", damping_Nms_rad);
-  const double per_Nm = (torque_Nm_rad + settings.tube_Nm_rad / settings.tube_ratio) /
-                        (gear_ratio_of(settings) * settings.tube_Nm_rad * torque_Nm_rad);
+  const double per_Nm = 1.0 / torque_per_twist_of(settings, torque_Nm_rad);
   return {.position = stiffness_Nm_rad * per_Nm,
           .damping_s = damping_Nms_rad * per_Nm,
           .torque_Nm_rad = torque_Nm_rad};
@@ -84,6 +88,7 @@ void TubeImpedance::reset() noexcept {
   is_returning_ = false;
   wanted_rad_ = 0.0;
   wanted_rad_s_ = 0.0;
+  wanted_Nm_ = 0.0;
   current_A_ = 0.0;
 }
 
@@ -96,19 +101,22 @@ TubeImpedance::Output TubeImpedance::fade() noexcept {
   return {.current_A = current_A_, .fault = Fault::input_not_finite};
 }
 
+double TubeImpedance::torque_per_twist(const Settings& settings) noexcept {
+  const double torque_Nm_rad = settings.gains.torque_Nm_rad;
+  return torque_Nm_rad > 0.0 ? torque_per_twist_of(settings, torque_Nm_rad) : 0.0;
+}
+
 double TubeImpedance::stiffness() const noexcept {
-  const Gains& gains = settings_.gains;
-  if (!(gains.torque_Nm_rad > 0.0)) return 0.0;
-  return gear_ratio_ * settings_.tube_Nm_rad * gains.position * gains.torque_Nm_rad /
-         (gains.torque_Nm_rad + settings_.tube_Nm_rad / settings_.tube_ratio);
+  return torque_per_twist(settings_) * settings_.gains.position;
 }
 
 TubeImpedance::Output TubeImpedance::step(double wanted_rad, double wanted_rad_s,
-                                          const Angles& measured) noexcept {
+                                          const Angles& measured, double wanted_Nm) noexcept {
   Output output;
-  if (std::isfinite(wanted_rad + wanted_rad_s)) {
+  if (std::isfinite(wanted_rad + wanted_rad_s + wanted_Nm)) {
     wanted_rad_ = wanted_rad;
     wanted_rad_s_ = wanted_rad_s;
+    wanted_Nm_ = wanted_Nm;
     has_reference_ = true;
   } else {
     output.fault = Fault::input_not_finite;
@@ -120,8 +128,9 @@ TubeImpedance::Output TubeImpedance::step(double wanted_rad, double wanted_rad_s
   if (!has_reference_ || !std::isfinite(output.twist_rad + measured.joint_rad)) return fade();
   output.position_rad = gains.position * (wanted_rad_ - measured.joint_rad);
   output.damping_rad = gains.damping_s * (wanted_rad_s_ - speed_.step(measured.joint_rad));
-  output.motor_torque_Nm =
-      gains.torque_Nm_rad * (output.position_rad + output.damping_rad - output.twist_rad);
+  if (gains.torque_Nm_rad > 0.0) output.feed_forward_rad = wanted_Nm_ / torque_per_twist(settings_);
+  output.motor_torque_Nm = gains.torque_Nm_rad * (output.position_rad + output.damping_rad +
+                                                  output.feed_forward_rad - output.twist_rad);
   const double max_A = settings_.drive.peak_current_A;
   const double impedance_A = output.motor_torque_Nm / settings_.drive.torque_constant_Nm_A;
   if (is_returning_) transfer_.add(current_A_ - impedance_A);

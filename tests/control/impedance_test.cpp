@@ -11,6 +11,7 @@
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
+#include "torsio/control/estimate_correction.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
@@ -291,6 +292,71 @@ RC_GTEST_PROP(TubeImpedance, GivesAFaultAndASafeCurrentForAnyNumbers, ()) {
     if (!is_measured || !std::isfinite(wanted_rad)) RC_ASSERT(output.fault != Fault::none);
     last_A = output.current_A;
   }
+}
+
+// A joint that is locked and asked for a torque besides its impedance.
+TEST(TubeImpedance, AddsTheTorqueThatIsAskedFor) {
+  auto settings = tube_settings(TubeImpedance::kZero);
+  settings.relies_on_friction = false;
+  settings.gains = TubeImpedance::gains_for(settings, 1000.0, 20.0, 0.5);
+  TubeImpedance impedance(settings, kRate_Hz);
+  const SeriesElasticJoint parts = TubeImpedance::joint_of(settings);
+  SpringJoint joint(parts, JointOutput::locked);
+  TubeImpedance::Output output;
+  constexpr double kWanted_Nm = 12.0;
+  for (int n = 0; n < 20'000; ++n) {
+    output = impedance.step(0.0, 0.0,
+                            {.rotor_rad = joint.angle_rad() * 102.0,
+                             .middle_rad = joint.joint_rad() * 51.0,
+                             .joint_rad = joint.joint_rad()},
+                            kWanted_Nm);
+    joint.step(output.current_A, 1.0 / kRate_Hz);
+  }
+  EXPECT_NEAR(parts.stiffness_Nm_rad * (joint.angle_rad() - joint.joint_rad()), kWanted_Nm, 0.05);
+  EXPECT_NEAR(output.feed_forward_rad * TubeImpedance::torque_per_twist(settings), kWanted_Nm,
+              1e-9);
+  auto without_gain = settings;
+  without_gain.gains = {};
+  EXPECT_EQ(TubeImpedance(without_gain, kRate_Hz).step(0.0, 0.0, {0.0, 0.0, 0.0}, 5.0).current_A,
+            0.0);
+}
+
+// ------------------------------------------------------------------------------- correction
+
+TEST(EstimateCorrection, IntegratesTheErrorUpToItsLimit) {
+  EstimateCorrection correction({.bandwidth_rad_s = 10.0, .torque_Nm = 0.5}, kRate_Hz);
+  EXPECT_DOUBLE_EQ(correction.step(3.0, {.value = 1.0}, false), 10.0 * 2.0 / kRate_Hz);
+  EXPECT_DOUBLE_EQ(correction.step(3.0, {.value = 1.0}, true), 10.0 * 2.0 / kRate_Hz)
+      << "it holds while the command is limited";
+  for (int n = 0; n < 1000; ++n) (void)correction.step(3.0, {.value = 1.0}, false);
+  EXPECT_DOUBLE_EQ(correction.correction_Nm(), 0.5);
+  correction.reset();
+  EXPECT_EQ(correction.correction_Nm(), 0.0);
+}
+
+TEST(EstimateCorrection, DecaysWithoutAUsableEstimate) {
+  EstimateCorrection correction({.bandwidth_rad_s = 10.0, .fault_decay_s = 0.05}, kRate_Hz);
+  const auto after = [&](double wanted_Nm, const Estimate& estimate) {
+    for (int n = 0; n < 100; ++n) (void)correction.step(1.0, {.value = 0.0}, false);
+    const double before_Nm = correction.correction_Nm();
+    for (int n = 0; n < 50; ++n) (void)correction.step(wanted_Nm, estimate, false);
+    return correction.correction_Nm() / before_Nm;
+  };
+  EXPECT_NEAR(after(1.0, {.value = 0.0, .fault = Fault::input_not_finite}), std::exp(-1.0), 1e-9);
+  EXPECT_NEAR(after(1.0, {.value = kNaN}), std::exp(-1.0), 1e-9);
+  EXPECT_NEAR(after(kNaN, {.value = 0.0}), std::exp(-1.0), 1e-9);
+}
+
+TEST(EstimateCorrection, RefusesWhatIsImpossible) {
+  const auto refusal = [](const EstimateCorrection::Settings& settings) {
+    return test::error_message([&] { EstimateCorrection(settings, kRate_Hz); });
+  };
+  EXPECT_EQ(refusal({}), "");
+  EXPECT_NE(refusal({.bandwidth_rad_s = 101.0}).find("at most 100 rad/s, found 101"),
+            std::string::npos);
+  EXPECT_NE(refusal({.bandwidth_rad_s = kNaN}), "");
+  EXPECT_NE(refusal({.torque_Nm = 0.0}), "");
+  EXPECT_NE(refusal({.fault_decay_s = -1.0}), "");
 }
 
 TEST(TubeImpedance, RefusesWhatItCannotRender) {

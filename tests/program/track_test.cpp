@@ -165,11 +165,37 @@ TEST_F(TrackVerb, RendersAnImpedance) {
       torsio("track --actuator harmonic-drive:soft --impedance zero --duration 10s").exit_code, 0);
 }
 
+TEST_F(TrackVerb, RendersAnImpedanceWithALearnedSpring) {
+  ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o chirp.csv").exit_code, 0);
+  ASSERT_EQ(torsio("fit chirp.csv --model dgmm -o spring.safetensors").exit_code, 0);
+  const Outcome table = torsio(
+      "track --actuator dfki-50 --impedance 100Nm_rad --impedance-damping 5Nms_rad "
+      "--duration 10s --model spring.safetensors --json runs.json --report page.html");
+  ASSERT_EQ(table.exit_code, 0) << table.err;
+  for (const char* word : {"inverse of the spring: linear",
+                           "inverse of the spring: spring.safetensors", "error up to 1 Hz"})
+    EXPECT_NE(table.out.find(word), std::string::npos) << word << " in: " << table.out;
+  const auto json = nlohmann::json::parse(contents("runs.json"));
+  ASSERT_EQ(json.at("runs").size(), 2U);
+  EXPECT_EQ(json.at("runs").at(1).at("model"), "spring.safetensors");
+  EXPECT_NE(contents("page.html").find("rendered with spring.safetensors"), std::string::npos);
+}
+
 TEST_F(TrackVerb, RefusesContradictionsOfTheImpedance) {
   const auto refused = [this](const std::string& flags, const std::string& text) {
     expect_error(torsio("track " + flags), kCallWasWrong, text);
   };
-  refused("--impedance high --actuator dfki-120", "torsion tube before its harmonic drive");
+  refused("--impedance high --actuator dfki-120", "gains are those of paper 004");
+  refused("--impedance 900Nm_rad --actuator dfki-120", "expected a damping from");
+  refused("--impedance zero --actuator dfki-50 --impedance-damping 500Nms_rad",
+          "the gains of --impedance zero");
+  refused("--impedance 0Nm_rad --actuator dfki-50 --impedance-damping 500Nms_rad",
+          "expected a damping of at most");
+  refused("--impedance 100Nm_rad --actuator dfki-120 --torque-gain 1Nm_rad",
+          "a torsion tube before its gear");
+  refused("--impedance 100Nm_rad --bandwidth 8Hz", "a torque loop through a spring");
+  refused("--correction 1Hz", "no impedance is controlled");
+  refused("--impedance 100Nm_rad --model nothing.safetensors", "nothing.safetensors: cannot open");
   refused("--impedance 1e6Nm_rad", "not passive up to 10 Hz");
   refused("--impedance stiff", "--impedance: expected high, zero or a stiffness");
   refused("--impedance 100Nm", "--impedance: expected high, zero or a stiffness");
@@ -177,9 +203,8 @@ TEST_F(TrackVerb, RefusesContradictionsOfTheImpedance) {
   refused("--impedance zero --torque-gain 1Nm_rad", "the gains of --impedance zero");
   refused("--impedance-damping 1Nms_rad", "no impedance is controlled");
   refused("--torque-gain 1Nm_rad", "no impedance is controlled");
-  for (const std::string flag :
-       {"--reference chirp", "--output free", "--lever 0.5m", "--model linear", "--bandwidth 8Hz",
-        "--damping 0.5", "--friction 0.5", "--observer 8Hz", "--feed-forward", "--seeds 2"})
+  for (const std::string flag : {"--reference chirp", "--output free", "--lever 0.5m",
+                                 "--friction 0.5", "--observer 8Hz", "--feed-forward", "--seeds 2"})
     refused("--impedance high " + flag,
             flag.substr(0, flag.find(' ')) + ": it belongs to the torque loop");
 }

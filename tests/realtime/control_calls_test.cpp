@@ -27,6 +27,7 @@
 #include "support/numbers.hpp"
 #include "support/system_calls.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
+#include "torsio/control/estimate_correction.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_impedance.hpp"
@@ -406,19 +407,21 @@ TEST(ControlCalls, OfJointImpedanceAreNone) {
             "");
 }
 
-TEST(ControlCalls, OfTubeImpedanceAreNone) {
+TEST(ControlCalls, OfTubeImpedanceAndItsCorrectionAreNone) {
   TubeImpedance::Settings settings =
       tube_impedance_settings(data_sheet("harmonic-drive"), TubeImpedance::kZero);
   settings.gains = TubeImpedance::gains_for(settings, 2000.0, 20.0, 0.5);
   TubeImpedance impedance(settings, kRate_Hz);
+  EstimateCorrection correction({.torque_Nm = 10.0}, kRate_Hz);
   Spoiled wanted(0.1, 4099);
   Spoiled rotor(0.1, 4111);
   EXPECT_EQ(besides_computing([&] {
               int faults = 0;
               for (int n = 0; n < kCycles; ++n) {
-                const auto output = impedance.step(
-                    wanted.next(), 0.1,
-                    {.rotor_rad = rotor.next(), .middle_rad = 0.0, .joint_rad = 0.0});
+                const auto output =
+                    impedance.step(wanted.next(), 0.1,
+                                   {.rotor_rad = rotor.next(), .middle_rad = 0.0, .joint_rad = 0.0},
+                                   correction.step(0.1, {.value = wanted.next()}, false));
                 faults += output.fault != Fault::none ? 1 : 0;
                 if (!std::isfinite(output.current_A)) return false;
               }

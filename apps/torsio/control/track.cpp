@@ -287,15 +287,20 @@ void run(TrackFlags& flags, const CLI::App& verb) {
   if (is_impedance && verb.get_option("--actuator")->count() == 0)
     flags.actuator = "harmonic-drive";
   check(flags);
-  if (is_impedance)
-    return run_impedance(flags.impedance, {.actuator = flags.actuator,
-                                           .amplitude = flags.amplitude,
-                                           .duration = flags.duration,
-                                           .seed = flags.seed,
-                                           .record = flags.record,
-                                           .json = flags.json,
-                                           .report = flags.report});
   flags.has_damping = verb.get_option("--damping")->count() > 0;
+  if (is_impedance)
+    return run_impedance(
+        flags.impedance,
+        {.actuator = flags.actuator,
+         .amplitude = flags.amplitude,
+         .duration = flags.duration,
+         .bandwidth = flags.bandwidth,
+         .loop_damping = flags.has_damping ? std::optional(flags.damping) : std::nullopt,
+         .models = flags.models,
+         .seed = flags.seed,
+         .record = flags.record,
+         .json = flags.json,
+         .report = flags.report});
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
   const std::vector<NamedModel> files = load_models(flags);
@@ -352,9 +357,11 @@ void add_track(CLI::App& app) {
       "given model, which is inverted or was trained with --target spring_deflection_rad.\n"
       "\n"
       "Example: torsio track --impedance 2000Nm_rad --impedance-damping 30Nms_rad\n"
-      "renders a stiffness and a damping at the output of harmonic-drive: the table compares the "
-      "wanted\n"
-      "with the rendered impedance from 0.1 to 10 Hz, and the forces of a hand follow.");
+      "renders a stiffness and a damping at the output, by default of harmonic-drive: the table "
+      "compares\n"
+      "the wanted with the rendered impedance from 0.1 to 10 Hz, and the forces of a hand follow. "
+      "A\n"
+      "model (--model) is the inverse of the spring, or its estimate corrects the torque.");
   verb->add_option("--actuator", flags->actuator,
                    "dfki-28 to dfki-300, as NAME:VARIANT#SERIAL, or a data sheet, FILE.yaml")
       ->capture_default_str();

@@ -1,16 +1,21 @@
 #include "control/track_impedance.hpp"
 
+#include <optional>
 #include <utility>
+#include <vector>
 
+#include "common/data_flags.hpp"
 #include "common/progress_bar.hpp"
 #include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
+#include "torsio/files/model_file.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
 
 namespace {
 
@@ -38,22 +43,55 @@ ImpedanceSpec spec_of(const ImpedanceFlags& flags, const SharedTrackFlags& share
     if (!text.empty()) value = torsio::signed_quantity_with_unit(text, unit, flag);
   };
   set(spec.damping_Nms_rad, flags.damping, "Nms_rad", "--impedance-damping");
-  set(spec.torque_gain_Nm_rad, flags.torque_gain, "Nm_rad", "--torque-gain");
-  set(spec.amplitude_Nm, shared.amplitude, "Nm", "--amplitude");
+  const auto set_optional = [](std::optional<double>& value, const std::string& text,
+                               const char* unit, const char* flag) {
+    if (!text.empty()) value = torsio::signed_quantity_with_unit(text, unit, flag);
+  };
+  set_optional(spec.torque_gain_Nm_rad, flags.torque_gain, "Nm_rad", "--torque-gain");
+  set_optional(spec.amplitude_Nm, shared.amplitude, "Nm", "--amplitude");
   set(spec.duration_s, shared.duration, "s", "--duration");
+  if (!shared.bandwidth.empty())
+    spec.bandwidth_rad_s = angular_frequency_rad_s(shared.bandwidth, "--bandwidth");
+  if (shared.loop_damping) spec.loop_damping = above_zero(*shared.loop_damping, "--damping");
+  if (!flags.correction.empty())
+    spec.correction_rad_s = angular_frequency_rad_s(flags.correction, "--correction");
   return spec;
+}
+
+torsio::ImpedanceModel model_of(const std::string& path, const torsio::DataSheet& sheet) {
+  try {
+    return torsio::impedance_model(path, torsio::load_model(path), sheet);
+  } catch (const torsio::UsageError&) {
+    throw;
+  } catch (const torsio::Error& error) {
+    torsio::ErrorReport report = error.report();
+    if (!report.place.starts_with(path)) report.place = path + ": " + report.place;
+    throw torsio::UsageError(std::move(report));
+  }
+}
+
+std::vector<torsio::ImpedanceModel> models_of(const std::vector<std::string>& paths,
+                                              const torsio::DataSheet& sheet) {
+  std::vector<torsio::ImpedanceModel> models;
+  for (const std::string& path : paths)
+    if (path != torsio::kSweepLineName) models.push_back(model_of(path, sheet));
+  return models;
 }
 
 }  // namespace
 
 void ImpedanceFlags::add(CLI::App& verb) {
   verb.add_option("--impedance", impedance,
-                  "impedance control of harmonic-drive instead of the torque loop: high or zero "
-                  "(gains of paper 004), or a stiffness: 2000Nm_rad");
+                  "impedance control instead of the torque loop: a stiffness, 2000Nm_rad, zero, or "
+                  "for harmonic-drive high (gains of paper 004)");
   verb.add_option("--impedance-damping", damping,
                   "with a stiffness: damping of the impedance, 30Nms_rad (default 0)");
   verb.add_option("--torque-gain", torque_gain,
-                  "with a stiffness: gain K_tp of the inner loop (default 0.5Nm_rad)");
+                  "with a stiffness of harmonic-drive: gain K_tp of the inner loop (default "
+                  "0.5Nm_rad)");
+  verb.add_option("--correction", correction,
+                  "with --impedance and a --model that has no inverse: bandwidth in which its "
+                  "estimate corrects the torque (default 6rad_s)");
 }
 
 void ImpedanceFlags::check(const CLI::App& verb) const {
@@ -67,27 +105,32 @@ void ImpedanceFlags::check(const CLI::App& verb) const {
                                       : "the gains of --impedance " + impedance + " are given",
          .expected = "a stiffness, --impedance 2000Nm_rad"});
   }
+  if (impedance.empty() && is_given("--correction"))
+    throw torsio::UsageError({.place = "--correction",
+                              .problem = "no impedance is controlled",
+                              .expected = "a stiffness, --impedance 2000Nm_rad"});
   if (impedance.empty()) return;
-  for (const char* flag :
-       {"--output", "--lever", "--reference", "--replay", "--mapping", "--model", "--bandwidth",
-        "--rate", "--damping", "--friction", "--observer", "--feed-forward", "--limits",
-        "--acts-on", "--velocity-bandwidth", "--faults", "--seeds"})
+  for (const char* flag : {"--output", "--lever", "--reference", "--replay", "--mapping", "--rate",
+                           "--friction", "--observer", "--feed-forward", "--limits", "--acts-on",
+                           "--velocity-bandwidth", "--faults", "--seeds"})
     if (is_given(flag))
       throw torsio::UsageError(
           {.place = flag,
            .problem = "it belongs to the torque loop, and --impedance replaces this loop",
            .expected = "one of the two loops",
-           .advice = "With --impedance: --impedance-damping, --torque-gain, --amplitude, "
-                     "--duration, --seed, --record, --json, --report."});
+           .advice = "With --impedance: --impedance-damping, --torque-gain, --model, "
+                     "--correction, --bandwidth, --damping, --amplitude, --duration, --seed, "
+                     "--record, --json, --report."});
 }
 
 void run_impedance(const ImpedanceFlags& flags, const SharedTrackFlags& shared) {
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(shared.actuator, progress.listener());
-  const torsio::ImpedanceRun run =
-      torsio::track_impedance(sheet, spec_of(flags, shared), shared.seed, progress.listener());
-  if (!shared.record.empty()) torsio::write_recording(run.record, shared.record);
-  if (shared.json.wants_tables()) print(torsio::impedance_text(run));
-  shared.json.write(torsio::impedance_json(run));
-  if (shared.report.is_wanted()) shared.report.write(torsio::impedance_report(run));
+  const torsio::ImpedanceSpec spec = spec_of(flags, shared);
+  const std::vector<torsio::ImpedanceRun> runs = torsio::track_impedances(
+      sheet, spec, models_of(shared.models, sheet), shared.seed, progress.listener());
+  if (!shared.record.empty()) torsio::write_recording(runs.back().record, shared.record);
+  if (shared.json.wants_tables()) print(torsio::impedance_text(runs));
+  shared.json.write(torsio::impedance_json(runs));
+  if (shared.report.is_wanted()) shared.report.write(torsio::impedance_report(runs));
 }

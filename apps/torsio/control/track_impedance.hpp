@@ -2,7 +2,9 @@
 
 #include <CLI/App.hpp>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "common/output.hpp"
 #include "common/report_output.hpp"
@@ -12,6 +14,7 @@ struct ImpedanceFlags {
   std::string impedance;  ///< high, zero or a stiffness; empty: the torque loop
   std::string damping;
   std::string torque_gain;
+  std::string correction;
 
   void add(CLI::App& verb);
   /// Refuses flags of the torque loop together with `--impedance`, and flags of the impedance
@@ -24,6 +27,9 @@ struct SharedTrackFlags {
   std::string actuator;
   std::string amplitude;
   std::string duration;
+  std::string bandwidth;
+  std::optional<double> loop_damping;
+  std::vector<std::string> models;
   std::uint64_t seed = 1;
   std::string record;
   JsonOutput json;

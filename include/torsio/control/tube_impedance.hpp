@@ -11,17 +11,18 @@ namespace torsio {
 /// The impedance controller of an actuator with a torsion tube before its harmonic drive, on the
 /// tube's twist:
 ///
-///     θ_s* = K_pp (q* − q) + K_dp (q̇* − q̇),   τ_m = K_tp (θ_s* − θ_s),   i = τ_m / k_t, |i| <= i_peak
+///     θ_s* = K_pp (q* − q) + K_dp (q̇* − q̇) + τ_ff / κ
+///     τ_m = K_tp (θ_s* − θ_s),   i = τ_m / k_t, |i| <= i_peak
 ///     θ_s = θ_m / N_g − θ_w         the twist of the tube
 ///     θ_s1 = θ_m / N_g − N_h q      that of tube and gear together, for a tube too stiff to measure
 ///
 /// θ_m, θ_w and q are the angles of rotor, wave generator and joint. At rest the joint is a spring of
 ///
-///     K = N_h k K_pp K_tp / (K_tp + k / N_g)
+///     K = κ K_pp,   κ = N_h k K_tp / (K_tp + k / N_g)
 ///
 /// and a damper likewise. Paper 004 uses K_pp = 15, K_tp = 5 (high) and 0, 0.5 (zero), and prints
-/// no units: Nm/rad for K_tp is assumed. Source: paper 004 section 2.3, specification 3.11; damping
-/// and the conversion from K to K_pp are ours.
+/// no units: Nm/rad for K_tp is assumed. Source: paper 004 section 2.3, specification 3.11; damping,
+/// torque and the conversion from K to K_pp are ours.
 class TubeImpedance {
  public:
   struct Gains {
@@ -57,11 +58,12 @@ class TubeImpedance {
   };
   struct Output {
     double current_A = 0.0;
-    double twist_rad = 0.0;        ///< θ_s, or θ_s1
-    double position_rad = 0.0;     ///< its share of θ_s*
-    double damping_rad = 0.0;      ///< its share of θ_s*
-    double motor_torque_Nm = 0.0;  ///< τ_m
-    double transfer_A = 0.0;       ///< in addition to τ_m / k_t, after a fault
+    double twist_rad = 0.0;         ///< θ_s, or θ_s1
+    double position_rad = 0.0;      ///< its share of θ_s*
+    double damping_rad = 0.0;       ///< its share of θ_s*
+    double feed_forward_rad = 0.0;  ///< its share of θ_s*
+    double motor_torque_Nm = 0.0;   ///< τ_m
+    double transfer_A = 0.0;        ///< in addition to τ_m / k_t, after a fault
     bool is_limited = false;
     Fault fault = Fault::none;
   };
@@ -81,11 +83,14 @@ class TubeImpedance {
   /// A reference that is not finite is a fault, and the last finite one is used (none yet: no
   /// current). A measurement that is not finite is a fault too: the current fades to 0 and
   /// continues from there.
-  Output step(double wanted_rad, double wanted_rad_s,
-              const Angles& measured) noexcept TORSIO_REALTIME;
+  /// @param wanted_Nm τ_ff, a torque on the joint in addition; without effect if K_tp is 0
+  Output step(double wanted_rad, double wanted_rad_s, const Angles& measured,
+              double wanted_Nm = 0.0) noexcept TORSIO_REALTIME;
 
   /// K [Nm/rad], at rest.
   [[nodiscard]] double stiffness() const noexcept;
+  /// κ [Nm/rad]: the torque at the joint for each rad of θ_s*, at rest; 0 if K_tp is 0.
+  [[nodiscard]] static double torque_per_twist(const Settings& settings) noexcept;
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
   /// The equivalent joint with the tube after both gears, and the feedback. Allocates.
   [[nodiscard]] static SeriesElasticJoint joint_of(const Settings& settings);
@@ -103,6 +108,7 @@ class TubeImpedance {
   bool is_returning_ = false;  ///< from a fault
   double wanted_rad_ = 0.0;
   double wanted_rad_s_ = 0.0;
+  double wanted_Nm_ = 0.0;
   double current_A_ = 0.0;
 };
 

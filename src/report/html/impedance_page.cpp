@@ -3,6 +3,8 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <span>
+#include <string>
 
 #include "report/html/time_figure_builder.hpp"
 #include "torsio/report/html/verb_reports.hpp"
@@ -13,11 +15,12 @@ namespace {
 
 using Value = std::complex<double> ImpedancePoint::*;
 
-/// A curve of the impedance for each of wanted, linear model and rendered.
+/// Wanted and linear model of the first run, and what each has rendered.
 template <class X, class Y>
-std::vector<XySeries> curves(const ImpedanceRun& run, const X& x, const Y& y) {
+std::vector<XySeries> curves(std::span<const ImpedanceRun> runs, const X& x, const Y& y) {
   std::vector<XySeries> series;
-  const auto add = [&](const char* label, CurveRole role, Value value) {
+  const auto add = [&](const ImpedanceRun& run, const std::string& label, CurveRole role,
+                       Value value) {
     XySeries one{.label = label, .role = role, .x = {}, .y = {}};
     for (const ImpedancePoint& point : run.points) {
       one.x.push_back(x(point, point.*value));
@@ -25,15 +28,18 @@ std::vector<XySeries> curves(const ImpedanceRun& run, const X& x, const Y& y) {
     }
     series.push_back(std::move(one));
   };
-  add("wanted", CurveRole::measured, &ImpedancePoint::wanted_Nm_rad);
-  add("linear model", CurveRole::model, &ImpedancePoint::linear_Nm_rad);
-  add("rendered", CurveRole::model, &ImpedancePoint::rendered_Nm_rad);
+  add(runs.front(), "wanted", CurveRole::measured, &ImpedancePoint::wanted_Nm_rad);
+  add(runs.front(), "linear model", CurveRole::model, &ImpedancePoint::linear_Nm_rad);
+  for (const ImpedanceRun& run : runs)
+    add(run, runs.size() > 1 && !run.model.empty() ? "rendered with " + run.model : "rendered",
+        CurveRole::model, &ImpedancePoint::rendered_Nm_rad);
   return series;
 }
 
 }  // namespace
 
-ReportDocument impedance_report(const ImpedanceRun& run) {
+ReportDocument impedance_report(std::span<const ImpedanceRun> runs) {
+  const ImpedanceRun& run = runs.front();
   const auto frequency = [](const ImpedancePoint& point, std::complex<double>) {
     return point.frequency_Hz;
   };
@@ -47,17 +53,17 @@ ReportDocument impedance_report(const ImpedanceRun& run) {
       .sections = {},
       .origin = {{"seed", fmt::format("{}", run.seed)}}};
   ReportSection section{.heading = "Impedance over the frequency",
-                        .preformatted = impedance_text(run)};
+                        .preformatted = impedance_text(runs)};
   section.figures.emplace_back(XyFigure{
       .title = "Bode diagram: magnitude",
       .x = {"frequency [Hz]", true},
       .y = {"|torque / angle| [Nm/rad]", true},
-      .series = curves(run, frequency, [](std::complex<double> z) { return std::abs(z); })});
+      .series = curves(runs, frequency, [](std::complex<double> z) { return std::abs(z); })});
   section.figures.emplace_back(
       XyFigure{.title = "Bode diagram: phase",
                .x = {"frequency [Hz]", true},
                .y = {"phase [deg]"},
-               .series = curves(run, frequency, [](std::complex<double> z) {
+               .series = curves(runs, frequency, [](std::complex<double> z) {
                  return std::arg(z) * 180.0 / std::numbers::pi;
                })});
   section.figures.emplace_back(
@@ -65,7 +71,7 @@ ReportDocument impedance_report(const ImpedanceRun& run) {
                .x = {"real part [Nm/rad]"},
                .y = {"imaginary part [Nm/rad]"},
                .series = curves(
-                   run, [](const ImpedancePoint&, std::complex<double> z) { return z.real(); },
+                   runs, [](const ImpedancePoint&, std::complex<double> z) { return z.real(); },
                    [](std::complex<double> z) { return z.imag(); }),
                .is_equal = true});
   document.sections.push_back(std::move(section));

@@ -1,38 +1,23 @@
 #include "joint_monitor.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <utility>
 
-#include "data/names.hpp"
 #include "safety/valid_source.hpp"
 #include "sim/sensors/sensed_channels.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 
 JointMonitor::JointMonitor(MonitoredTorque monitored, const DataSheet& sheet, bool is_electrical)
     : monitored_(std::move(monitored)), raw_(monitored_.raw_inputs().size()) {
-  const std::vector<SensedChannel> channels = sensed_channels(sheet, is_electrical);
-  for (const std::string& name : monitored_.raw_inputs()) {
-    const auto found = std::ranges::find(channels, name, &SensedChannel::name);
-    if (found == channels.end()) {
-      std::vector<std::string> known;
-      known.reserve(channels.size());
-      for (const SensedChannel& channel : channels) known.emplace_back(channel.name);
-      throw Error({.place = "monitor of " + sheet.name,
-                   .expected = "inputs that its sensors measure: " + joined(known),
-                   .found = fmt::format("'{}'", printable(name))});
-    }
-    inputs_.push_back({.value = found->value,
-                       .is_fresh = found->is_fresh,
-                       .scale = found->scale,
-                       .is_current = found->value == &Measurement::motor_current_A});
-  }
+  for (const SensedChannel& channel :
+       sensed_inputs(sheet, monitored_.raw_inputs(), "monitor", is_electrical))
+    inputs_.push_back({.value = channel.value,
+                       .is_fresh = channel.is_fresh,
+                       .scale = channel.scale,
+                       .is_current = channel.value == &Measurement::motor_current_A});
 }
 
 Monitor::State JointMonitor::step(double t_s, const Measurement& measured,

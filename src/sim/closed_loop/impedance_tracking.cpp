@@ -1,6 +1,7 @@
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -10,17 +11,21 @@
 #include <utility>
 #include <variant>
 
-#include "control/design/loop_design.hpp"
 #include "core/checks.hpp"
 #include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "sim/bench/bench.hpp"
+#include "sim/closed_loop/impedance_loop.hpp"
 #include "sim/sensors/bench_log.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/common/inputs.hpp"
 #include "torsio/signal/excitation.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {
@@ -29,7 +34,10 @@ using Complex = std::complex<double>;
 
 constexpr auto kImpedance = "impedance";
 constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr std::uint64_t kLineSeed = 1;
 constexpr double kLargestAmplitude_Nm = 50.0;  // as the experiments of the bench
+constexpr double kTubeAmplitude_Nm = 20.0;
+constexpr double kAmplitudeShare = 0.2;  // share of the rated torque
 constexpr double kShortestImpedance_s = 10.0;
 constexpr double kLongestImpedance_s = 3600.0;
 constexpr double kFurthest_rad = 200.0;       // 30 turns: beyond it the loop diverges
@@ -40,58 +48,121 @@ constexpr double kShortestMeasured_s = 4.0;
 // constant.
 constexpr std::array kFrequencies_Hz = {0.1, 0.2, 0.4, 0.5, 0.8, 1.0, 2.0, 4.0, 5.0, 8.0, 10.0};
 
-struct Linear {
-  SeriesElasticJoint joint;
-  JointFeedback feedback;
-
-  explicit Linear(const TubeImpedance::Settings& settings)
-      : joint(TubeImpedance::joint_of(settings)),
-        feedback(TubeImpedance::feedback_of(settings, kBenchRate_Hz)) {}
-
-  [[nodiscard]] double passive_to_Hz() const {
-    for (const JointOutput output : {JointOutput::locked, JointOutput::free})
-      if (!is_stable_closed(open_loop(joint, feedback, output))) return 0.0;
-    return passivity(joint, feedback).passive_to_rad_s / kTurn;
-  }
-  /// Torque over angle at the output.
-  [[nodiscard]] Complex at(double frequency_Hz) const {
-    const double rad_s = kTurn * frequency_Hz;
-    const Complex s(0.0, rad_s);
-    return s * (impedance(joint, feedback, rad_s) + s * joint.joint_inertia_kg_m2 +
-                joint.joint_viscous_Nms_rad);
-  }
-};
-
 void require_setting(bool holds, const char* what, std::string_view expected, double found) {
   require<UsageError>(holds, fmt::format("{} {}", kImpedance, what), expected, found);
 }
 
-void check(const ImpedanceSpec& spec) {
+bool has_tube(const DataSheet& sheet) { return sheet.family == ActuatorFamily::harmonic_drive; }
+
+double amplitude_of(const DataSheet& sheet, const ImpedanceSpec& spec) {
+  return spec.amplitude_Nm.value_or(
+      has_tube(sheet) ? kTubeAmplitude_Nm : kAmplitudeShare * sheet.rating.torque_Nm.value);
+}
+
+void check(const DataSheet& sheet, const ImpedanceSpec& spec) {
   require_setting(spec.stiffness_Nm_rad >= 0.0 && std::isfinite(spec.stiffness_Nm_rad), "stiffness",
                   "0 Nm/rad or more", spec.stiffness_Nm_rad);
   require_setting(spec.damping_Nms_rad >= 0.0 && std::isfinite(spec.damping_Nms_rad), "damping",
                   "0 Nms/rad or more", spec.damping_Nms_rad);
-  require_setting(spec.torque_gain_Nm_rad > 0.0 && std::isfinite(spec.torque_gain_Nm_rad),
-                  "torque gain", "above 0 Nm/rad", spec.torque_gain_Nm_rad);
-  require_setting(spec.amplitude_Nm > 0.0 && spec.amplitude_Nm <= kLargestAmplitude_Nm, "amplitude",
-                  fmt::format("above 0 and at most {:g} Nm", kLargestAmplitude_Nm),
-                  spec.amplitude_Nm);
+  const auto require_above_zero = [](const std::optional<double>& value, const char* what,
+                                     std::string_view expected) {
+    if (value) require_setting(*value > 0.0 && std::isfinite(*value), what, expected, *value);
+  };
+  require_above_zero(spec.torque_gain_Nm_rad, "torque gain", "above 0 Nm/rad");
+  require_above_zero(spec.bandwidth_rad_s, "bandwidth", "above 0 rad/s");
+  require_above_zero(spec.loop_damping, "damping of the torque loop", "above 0");
+  const double largest_Nm = has_tube(sheet) ? kLargestAmplitude_Nm : sheet.rating.torque_Nm.value;
+  const double amplitude_Nm = amplitude_of(sheet, spec);
+  require_setting(amplitude_Nm > 0.0 && amplitude_Nm <= largest_Nm, "amplitude",
+                  fmt::format("above 0 and at most {:g} Nm", largest_Nm), amplitude_Nm);
   require_setting(
       spec.duration_s >= kShortestImpedance_s && spec.duration_s <= kLongestImpedance_s, "duration",
       fmt::format("{:g} to {:g} s", kShortestImpedance_s, kLongestImpedance_s), spec.duration_s);
 }
 
-double largest_passive_Nm_rad(const TubeImpedance::Settings& settings, double damping_Nms_rad) {
-  return passive_stiffness(settings, damping_Nms_rad, kTurn * ImpedanceRun::kPassiveTo_Hz,
-                           kBenchRate_Hz);
+bool is_stable_with(ImpedancePlan plan, const JointImpedance::Gains& gains) {
+  std::get<ImpedancePlan::Spring>(plan.controller).gains = gains;
+  return LinearImpedance(plan).is_stable();
 }
 
-void require_passive(const TubeImpedance::Settings& settings, const ImpedanceSpec& spec) {
-  const double passive_to_Hz = Linear(settings).passive_to_Hz();
+/// The values of a gain, geometrically from below, up to the first that is (not) stable.
+/// @returns the first stable one, or the last before one that is not stable; none if there is none
+template <class GainsOf>
+std::optional<double> find_gain(const ImpedancePlan& plan, double lowest, double highest,
+                                bool looks_for_stable, const GainsOf& gains_of) {
+  constexpr double kGainStep = 1.1;
+  std::optional<double> last;
+  if (!(lowest > 0.0)) return last;
+  const auto steps = static_cast<int>(std::log(highest / lowest) / std::log(kGainStep));
+  double value = lowest;
+  for (int n = 0; n <= steps; ++n, value *= kGainStep) {
+    const bool is_stable = is_stable_with(plan, gains_of(value));
+    if (looks_for_stable && is_stable) return value;
+    if (!looks_for_stable && !is_stable) return last;
+    if (!looks_for_stable) last = value;
+  }
+  return last;
+}
+
+/// The least damping that makes a stiffness stable; none if there is none.
+std::optional<double> stable_damping(const ImpedancePlan& plan, double stiffness_Nm_rad) {
+  constexpr double kShortest_s = 1e-4;
+  constexpr double kLongest_s = 1.0;
+  return find_gain(plan, kShortest_s * stiffness_Nm_rad, kLongest_s * stiffness_Nm_rad, true,
+                   [&](double value) {
+                     return JointImpedance::Gains{stiffness_Nm_rad, value};
+                   });
+}
+
+std::string stable_gains(const ImpedancePlan& plan, const JointImpedance::Gains& gains) {
+  constexpr double kSmallest = 1e-4;
+  constexpr double kRounding = 1.01;  // more than that of three digits
+  const auto stiffness = find_gain(plan, kSmallest * gains.stiffness_Nm_rad, gains.stiffness_Nm_rad,
+                                   false, [&](double value) {
+                                     return JointImpedance::Gains{value, gains.damping_Nms_rad};
+                                   });
+  const auto damping = stable_damping(plan, gains.stiffness_Nm_rad);
+  std::vector<std::string> ways;
+  double less_Nms_rad = gains.damping_Nms_rad;
+  for (int n = 0; n < 100 && less_Nms_rad > 0.0; ++n, less_Nms_rad /= 1.1)
+    if (is_stable_with(plan, {gains.stiffness_Nm_rad, less_Nms_rad / kRounding})) {
+      ways.push_back(fmt::format("a damping of at most {:.3g} Nms/rad", less_Nms_rad / kRounding));
+      break;
+    }
+  if (damping && gains.damping_Nms_rad < *damping)
+    ways.push_back(fmt::format("a damping from {:.3g} Nms/rad on", kRounding * *damping));
+  if (stiffness)
+    ways.push_back(fmt::format("at most {:.3g} Nm/rad with this damping", *stiffness / kRounding));
+  double softer_Nm_rad = 0.5 * gains.stiffness_Nm_rad;
+  for (int n = 0; ways.empty() && n < 10; ++n, softer_Nm_rad *= 0.5)
+    if (const auto found = stable_damping(plan, softer_Nm_rad))
+      ways.push_back(fmt::format("for example {:.3g} Nm/rad with {:.3g} Nms/rad", softer_Nm_rad,
+                                 kRounding * *found));
+  return ways.empty() ? "another bandwidth" : fmt::format("{}", fmt::join(ways, ", or "));
+}
+
+void require_stable(const ImpedancePlan& plan) {
+  if (LinearImpedance(plan).is_stable()) return;
+  const JointImpedance::Gains gains = std::get<ImpedancePlan::Spring>(plan.controller).gains;
+  throw UsageError(
+      {.place = kImpedance,
+       .problem = "the loop is unstable without dry friction, with the output locked or free",
+       .expected = stable_gains(plan, gains),
+       .found =
+           fmt::format("{:g} Nm/rad, {:g} Nms/rad{}", gains.stiffness_Nm_rad, gains.damping_Nms_rad,
+                       plan.estimator ? fmt::format(", corrected by an estimate below {:.3g} Hz",
+                                                    plan.correction.bandwidth_rad_s / kTurn)
+                                      : std::string())});
+}
+
+void require_passive(const ImpedancePlan& plan, const LinearImpedance& linear,
+                     const ImpedanceSpec& spec) {
+  const double passive_to_Hz = linear.passive_to_Hz();
   if (passive_to_Hz >= ImpedanceRun::kPassiveTo_Hz) return;
-  const double largest_Nm_rad = largest_passive_Nm_rad(settings, spec.damping_Nms_rad);
+  const double largest_Nm_rad = plan.largest_passive_Nm_rad(ImpedanceRun::kPassiveTo_Hz);
+  const double gain_Nm_rad = std::get<TubeImpedance::Settings>(plan.controller).gains.torque_Nm_rad;
   const std::string with = fmt::format("a damping of {:g} Nms/rad and a torque gain of {:g} Nm/rad",
-                                       spec.damping_Nms_rad, spec.torque_gain_Nm_rad);
+                                       spec.damping_Nms_rad, gain_Nm_rad);
   const std::string unstable = "unstable without dry friction";
   throw UsageError(
       {.place = kImpedance,
@@ -104,23 +175,37 @@ void require_passive(const TubeImpedance::Settings& settings, const ImpedanceSpe
        .found = fmt::format(
            "{:g} Nm/rad, {}", spec.stiffness_Nm_rad,
            passive_to_Hz > 0.0 ? fmt::format("passive up to {:.3g} Hz", passive_to_Hz) : unstable),
-       .advice = "Take less stiffness, or a torque gain of 1 Nm/rad or less."});
+       .advice = plan.estimator && largest_Nm_rad >= spec.stiffness_Nm_rad
+                     ? "Without the model it is passive: the estimate corrects too fast for it."
+                     : "Take less stiffness, or a torque gain of 1 Nm/rad or less."});
+}
+
+/// The checked plan.
+ImpedancePlan plan_of(const DataSheet& sheet, const ImpedanceSpec& spec,
+                      const std::optional<ImpedanceModel>& model, const LinearInverse& line) {
+  check(sheet, spec);
+  ImpedancePlan plan = impedance_plan(sheet, spec, model ? &*model : nullptr, line);
+  if (!has_tube(sheet))
+    require_stable(plan);
+  else if (spec.kind == ImpedanceSpec::Kind::wanted)
+    require_passive(plan, LinearImpedance(plan), spec);
+  (void)ImpedanceLoop(plan);
+  return plan;
 }
 
 /// The bench under impedance control, tick by tick.
 class ImpedanceBench {
  public:
-  ImpedanceBench(const DataSheet& sheet, const TubeImpedance::Settings& settings, double duration_s,
-                 std::uint64_t seed)
+  ImpedanceBench(const ImpedancePlan& plan, double duration_s, std::uint64_t seed)
       : bench_(
-            sheet,
+            *plan.sheet,
             {.name = kImpedance,
              .duration_s = duration_s,
              .seed = seed,
              .conditions = {},
              .faults = no_faults_},
             {.start = {}, .load_cell = LoadCell::external, .duration_s = duration_s, .next = {}}),
-        controller_(settings, kBenchRate_Hz),
+        loop_(plan),
         ticks_(static_cast<std::size_t>(std::lround(duration_s * kBenchRate_Hz))) {}
 
   /// @param torque_of the torque [Nm] of the environment on the output in this tick, for its state
@@ -139,10 +224,7 @@ class ImpedanceBench {
                      .problem = "the angle of the joint grows without bound",
                      .expected = fmt::format("an angle within {:g} rad", kFurthest_rad),
                      .found = fmt::format("{:g} rad", state.joint_angle_rad)});
-      const TubeImpedance::Output out = controller_.step(0.0, 0.0,
-                                                         {.rotor_rad = measured.motor_angle_rad,
-                                                          .middle_rad = measured.middle_angle_rad,
-                                                          .joint_rad = measured.joint_angle_rad});
+      const ImpedanceLoop::Output out = loop_.step(bench_.time_s(), measured);
       limited_ += out.is_limited ? 1 : 0;
       const double torque_Nm = torque_of(state);
       observe(tick, torque_Nm, measured, truth);
@@ -156,7 +238,7 @@ class ImpedanceBench {
  private:
   const FaultSchedule no_faults_ = {};
   Bench bench_;
-  TubeImpedance controller_;
+  ImpedanceLoop loop_;
   std::size_t ticks_;
   std::size_t limited_ = 0;
 };
@@ -171,8 +253,7 @@ struct Cycles {
 };
 
 /// First harmonics of torque and angle, over whole periods after the settling.
-ImpedancePoint point_at(double frequency_Hz, const DataSheet& sheet,
-                        const TubeImpedance::Settings& settings, const ImpedanceSpec& spec,
+ImpedancePoint point_at(double frequency_Hz, const ImpedancePlan& plan, double amplitude_Nm,
                         std::uint64_t seed, Cycles& cycles, const Progress& progress) {
   const auto whole_periods_s = [&](double least_s) {
     return std::ceil(least_s * frequency_Hz) / frequency_Hz;
@@ -180,15 +261,13 @@ ImpedancePoint point_at(double frequency_Hz, const DataSheet& sheet,
   const double settling_s = whole_periods_s(kImpedanceSettling_s);
   const double measured_s = whole_periods_s(std::max(kShortestMeasured_s, kPeriods / frequency_Hz));
   const auto first = static_cast<std::size_t>(std::lround(settling_s * kBenchRate_Hz));
-  ImpedanceBench bench(sheet, settings, settling_s + measured_s, seed);
+  ImpedanceBench bench(plan, settling_s + measured_s, seed);
   const double rad = kTurn * frequency_Hz / kBenchRate_Hz;
   Complex torque;
   Complex angle;
   std::size_t tick = 0;
   bench.run(
-      [&](const PlantState&) {
-        return spec.amplitude_Nm * std::sin(rad * static_cast<double>(tick++));
-      },
+      [&](const PlantState&) { return amplitude_Nm * std::sin(rad * static_cast<double>(tick++)); },
       [&](std::size_t at, double torque_Nm, const Measurement&, const BenchTruth& truth) {
         if (at < first) return;
         const Complex turn = std::polar(1.0, -rad * static_cast<double>(at));
@@ -201,7 +280,7 @@ ImpedancePoint point_at(double frequency_Hz, const DataSheet& sheet,
   const Complex hold = std::polar(std::sin(0.5 * rad) / (0.5 * rad), -0.5 * rad);
   return {.frequency_Hz = frequency_Hz,
           .wanted_Nm_rad = {},
-          .linear_Nm_rad = Linear(settings).at(frequency_Hz),
+          .linear_Nm_rad = LinearImpedance(plan).at(frequency_Hz),
           .rendered_Nm_rad = hold * torque / angle};
 }
 
@@ -218,9 +297,10 @@ class Range {
   double high_ = 0.0;
 };
 
-void move_hand(ImpedanceRun& run, const DataSheet& sheet, const TubeImpedance::Settings& settings,
-               Cycles& cycles, const Progress& progress) {
-  ImpedanceBench bench(sheet, settings, run.spec.duration_s, run.seed);
+void move_hand(ImpedanceRun& run, const ImpedancePlan& plan, Cycles& cycles,
+               const Progress& progress) {
+  const DataSheet& sheet = *plan.sheet;
+  ImpedanceBench bench(plan, run.spec.duration_s, run.seed);
   BenchLog log(sheet, bench.ticks(), true);
   // Not the numbers that the sensors' noise is made of.
   QuasiPeriodic path({.amplitude = HandForces::kAmplitude_rad,
@@ -234,12 +314,15 @@ void move_hand(ImpedanceRun& run, const DataSheet& sheet, const TubeImpedance::S
   double excess_squares = 0.0;
   double work_J = 0.0;
   HandForces& of = run.hand;
+  const double arm = std::min(1.0, sheet.rating.torque_Nm.value / HandForces::kFullArm_Nm);
+  of.arm_stiffness_Nm_rad *= arm;
+  of.arm_damping_Nms_rad *= arm;
   bench.run(
       [&](const PlantState& state) {
         const double last_rad = std::exchange(hand_rad, path.step());
         const double hand_rad_s = (hand_rad - last_rad) * kBenchRate_Hz;
-        return HandForces::kArmStiffness_Nm_rad * (hand_rad - state.joint_angle_rad) +
-               HandForces::kArmDamping_Nms_rad * (hand_rad_s - state.joint_speed_rad_s);
+        return of.arm_stiffness_Nm_rad * (hand_rad - state.joint_angle_rad) +
+               of.arm_damping_Nms_rad * (hand_rad_s - state.joint_speed_rad_s);
       },
       [&](std::size_t /*tick*/, double torque_Nm, const Measurement& measured,
           const BenchTruth& truth) {
@@ -269,53 +352,118 @@ void move_hand(ImpedanceRun& run, const DataSheet& sheet, const TubeImpedance::S
 
 }  // namespace
 
-TubeImpedance::Settings impedance_settings(const DataSheet& sheet, const ImpedanceSpec& spec) {
-  if (sheet.family != ActuatorFamily::harmonic_drive)
-    throw UsageError({.place = kImpedance,
-                      .expected = "an actuator with a torsion tube before its harmonic drive, "
-                                  "harmonic-drive",
-                      .found = sheet.name,
-                      .advice = "For a series-elastic actuator the library has JointImpedance on "
-                                "a torque loop (docs/robot/control.md)."});
-  check(spec);
-  TubeImpedance::Settings settings = tube_impedance_settings(
-      sheet, spec.kind == ImpedanceSpec::Kind::high ? TubeImpedance::kHigh : TubeImpedance::kZero);
-  // A rigid tube twists too little for its encoders.
-  if (sheet.variant == "rigid") settings.twist = TubeImpedance::Twist::tube_and_gear;
-  settings.relies_on_friction = spec.kind == ImpedanceSpec::Kind::high;
-  if (spec.kind != ImpedanceSpec::Kind::wanted) return settings;
-  settings.gains = TubeImpedance::gains_for(settings, spec.stiffness_Nm_rad, spec.damping_Nms_rad,
-                                            spec.torque_gain_Nm_rad);
-  require_passive(settings, spec);
-  return settings;
+namespace {
+
+/// A discrete model with memory runs at the rate of its training, which the loop holds.
+double estimator_rate_Hz(const ModelFile& model) {
+  const double ticks = std::round(kBenchRate_Hz / model.settings.sample_rate_Hz);
+  const bool is_whole =
+      ticks >= 1.0 && std::abs(ticks * model.settings.sample_rate_Hz - kBenchRate_Hz) < 1e-6;
+  return is_whole ? model.settings.sample_rate_Hz : kBenchRate_Hz;
 }
 
-ImpedanceRun track_impedance(const DataSheet& sheet, const ImpedanceSpec& spec, std::uint64_t seed,
+}  // namespace
+
+ImpedanceModel impedance_model(std::string name, const ModelFile& model, const DataSheet& sheet) {
+  std::string reason = "the torque of this actuator's tube is controlled by its twist";
+  if (!has_tube(sheet)) {
+    try {
+      AnyInverse inverse = inverse_of(model);
+      return {.name = std::move(name), .use = std::move(inverse)};
+    } catch (const Error& error) {
+      reason = error.what();
+    }
+  }
+  Estimator estimator = make_estimator(model, estimator_rate_Hz(model));
+  const EstimatorSettings& settings = estimator.settings();
+  if (settings.target != "torque_Nm" || !settings.zeroed_channels.empty())
+    throw Error({.place = kImpedance,
+                 .expected = "a model of torque_Nm without zero rules, or one with an inverse",
+                 .found = fmt::format("a model of {}; {}", settings.target, reason)});
+  (void)sensed_inputs(sheet, estimator.raw_inputs(), kImpedance);
+  return {.name = std::move(name), .use = std::move(estimator), .reason = std::move(reason)};
+}
+
+LinearInverse spring_line(const DataSheet& sheet, std::uint64_t seed, const Progress& progress) {
+  if (has_tube(sheet))
+    throw UsageError({.place = kImpedance,
+                      .expected = "an actuator whose spring is at the joint",
+                      .found = sheet.name});
+  if (sheet.family == ActuatorFamily::series_elastic) return sweep_line(sheet, seed, progress);
+  Dataset cycle;
+  Recording recording = simulate(sheet, {.experiment = "static-cycle", .seed = seed}, progress);
+  const std::size_t samples = recording.size();
+  cycle.records.push_back({std::move(recording), whole_record(samples, Role::train)});
+  const char* const twist = sheet.family == ActuatorFamily::rubber_clutch
+                                ? "input_angle_rad - joint_angle_rad"
+                                : "spring_deflection_rad";
+  const TrainedModel trained =
+      train_model(cycle, {.family = "linear", .features = resolve_inputs(cycle, {twist})}, seed);
+  const LinearFallback& line = trained.file.settings.fallback;
+  return LinearInverse(line.slope.front(), line.intercept);
+}
+
+ImpedanceRun track_impedance(const DataSheet& sheet, const ImpedanceSpec& spec,
+                             const std::optional<ImpedanceModel>& model, std::uint64_t seed,
                              const Progress& progress) {
-  const TubeImpedance::Settings settings = impedance_settings(sheet, spec);
+  (void)plan_of(sheet, spec, model, LinearInverse(1.0));  // before the line of the spring
+  const bool is_own_inverse = model && std::holds_alternative<AnyInverse>(model->use);
+  const bool needs_line = !has_tube(sheet) && !is_own_inverse;
+  const std::size_t runs = kFrequencies_Hz.size() + (needs_line ? 2 : 1);
+  std::size_t done = 0;
+  const LinearInverse line =
+      needs_line
+          ? spring_line(sheet, kLineSeed, part_of(progress, done++, runs, "line of the spring"))
+          : LinearInverse(1.0);
+  const ImpedancePlan plan = plan_of(sheet, spec, model, line);
+  const LinearImpedance linear(plan);
   ImpedanceRun run{
       .actuator = sheet.serial ? fmt::format("{}#{:02}", sheet.name, *sheet.serial) : sheet.name,
       .variant = std::string(sheet.variant),
       .spec = spec,
       .seed = seed,
-      .gains = settings.gains,
-      .stiffness_Nm_rad = TubeImpedance(settings, kBenchRate_Hz).stiffness(),
-      .damping_Nms_rad = spec.kind == ImpedanceSpec::Kind::wanted ? spec.damping_Nms_rad : 0.0,
-      .passive_to_Hz = Linear(settings).passive_to_Hz(),
+      .model = model ? model->name : std::string(needs_line ? kSweepLineName : ""),
+      .model_reason = model ? model->reason : std::string(),
+      .amplitude_Nm = amplitude_of(sheet, spec),
+      .stiffness_Nm_rad = plan.stiffness_Nm_rad(),
+      .damping_Nms_rad = plan.damping_Nms_rad(),
+      .passive_to_Hz = linear.passive_to_Hz(),
+      .passive_goal_Hz =
+          has_tube(sheet) ? ImpedanceRun::kPassiveTo_Hz : ImpedanceRun::kPassiveSpringTo_Hz,
       .record = Recording("", kBenchRate_Hz)};
-  run.largest_passive_Nm_rad = largest_passive_Nm_rad(settings, run.damping_Nms_rad);
-  const std::size_t runs = kFrequencies_Hz.size() + 1;
+  if (const auto* const spring = std::get_if<ImpedancePlan::Spring>(&plan.controller)) {
+    run.deflection = DeflectionController::gains_for(spring->torque.deflection);
+    run.bandwidth_rad_s = spring->torque.deflection.bandwidth_rad_s;
+  } else {
+    run.tube = std::get<TubeImpedance::Settings>(plan.controller).gains;
+  }
+  run.largest_passive_Nm_rad = plan.largest_passive_Nm_rad(run.passive_goal_Hz);
   Cycles cycles;
   for (const double frequency_Hz : kFrequencies_Hz) {
     run.points.push_back(
-        point_at(frequency_Hz, sheet, settings, spec, seed, cycles,
-                 part_of(progress, run.points.size(), runs, fmt::format("{:g} Hz", frequency_Hz))));
+        point_at(frequency_Hz, plan, run.amplitude_Nm, seed, cycles,
+                 part_of(progress, done++, runs, fmt::format("{:g} Hz", frequency_Hz))));
     run.points.back().wanted_Nm_rad = {run.stiffness_Nm_rad,
                                        kTurn * frequency_Hz * run.damping_Nms_rad};
   }
-  move_hand(run, sheet, settings, cycles, part_of(progress, runs - 1, runs, "hand"));
+  move_hand(run, plan, cycles, part_of(progress, done, runs, "hand"));
   run.limited_share = static_cast<double>(cycles.limited) / static_cast<double>(cycles.all);
   return run;
+}
+
+std::vector<ImpedanceRun> track_impedances(const DataSheet& sheet, const ImpedanceSpec& spec,
+                                           std::span<const ImpedanceModel> models,
+                                           std::uint64_t seed, const Progress& progress) {
+  std::vector<std::optional<ImpedanceModel>> all = {std::nullopt};
+  all.insert(all.end(), models.begin(), models.end());
+  for (const auto& model : all) (void)plan_of(sheet, spec, model, LinearInverse(1.0));
+  std::vector<ImpedanceRun> runs;
+  runs.reserve(all.size());
+  for (const auto& model : all)
+    runs.push_back(track_impedance(
+        sheet, spec, model, seed,
+        part_of(progress, runs.size(), all.size(), model ? model->name : "without a model")));
+  return runs;
 }
 
 }  // namespace torsio

@@ -1,6 +1,12 @@
 #include "sim/sensors/sensed_channels.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "data/names.hpp"
 #include "sim/plant/plant.hpp"
+#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -53,6 +59,26 @@ std::vector<SensedChannel> sensed_channels(const DataSheet& sheet, bool is_elect
                      drive_channel("supply_current_A", &Measurement::supply_current_A),
                      drive_channel("stator_temperature_K", &Measurement::stator_temperature_K)});
   return channels;
+}
+
+std::vector<SensedChannel> sensed_inputs(const DataSheet& sheet,
+                                         const std::vector<std::string>& names,
+                                         std::string_view place, bool is_electrical) {
+  const std::vector<SensedChannel> channels = sensed_channels(sheet, is_electrical);
+  std::vector<SensedChannel> inputs;
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(channels, name, &SensedChannel::name);
+    if (found == channels.end()) {
+      std::vector<std::string> known;
+      known.reserve(channels.size());
+      for (const SensedChannel& channel : channels) known.emplace_back(channel.name);
+      throw Error({.place = fmt::format("{} of {}", place, sheet.name),
+                   .expected = "inputs that its sensors measure: " + joined(known),
+                   .found = fmt::format("'{}'", printable(name))});
+    }
+    inputs.push_back(*found);
+  }
+  return inputs;
 }
 
 }  // namespace torsio

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -21,5 +22,12 @@ struct SensedChannel {
 /// @param is_electrical the plant has an electrical drive, whose sensors are logged as well
 [[nodiscard]] std::vector<SensedChannel> sensed_channels(const DataSheet& sheet,
                                                          bool is_electrical = false);
+
+/// Looks up its channels with these names, in the order of the names.
+/// @throws Error naming the first that this actuator's sensors do not measure.
+[[nodiscard]] std::vector<SensedChannel> sensed_inputs(const DataSheet& sheet,
+                                                       const std::vector<std::string>& names,
+                                                       std::string_view place,
+                                                       bool is_electrical = false);
 
 }  // namespace torsio

@@ -5,10 +5,16 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "support/error_message.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/train_model.hpp"
 #include "torsio/report/tracking.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {
@@ -87,7 +93,7 @@ TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {
   // Against a wall the arm is deflected by the whole motion of the hand. Zero impedance does not
   // make the torque small: inertia and friction of the drive remain.
   const double wall_Nm =
-      HandForces::kArmStiffness_Nm_rad * rad_from_deg(0.5 * high.hand.hand_range_deg);
+      high.hand.arm_stiffness_Nm_rad * rad_from_deg(0.5 * high.hand.hand_range_deg);
   EXPECT_NEAR(high.hand.max_Nm, wall_Nm, 0.25 * wall_Nm);
   EXPECT_NEAR(high.hand.rms_N, 2.0 * high.hand.rms_Nm, 1e-9) << "at 0.5 m";
   EXPECT_LE(high.hand.rms_Nm, high.hand.max_Nm);
@@ -98,8 +104,7 @@ TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {
 TEST(ImpedanceTracking, TheHandMeetsTheWantedImpedance) {
   const ImpedanceRun& run = ideal_run();
   const HandForces& hand = run.hand;
-  const double share =
-      HandForces::kArmStiffness_Nm_rad / (HandForces::kArmStiffness_Nm_rad + 1000.0);
+  const double share = hand.arm_stiffness_Nm_rad / (hand.arm_stiffness_Nm_rad + 1000.0);
   EXPECT_NEAR(hand.joint_range_deg, share * hand.hand_range_deg, 0.2 * share * hand.hand_range_deg);
   EXPECT_LT(hand.rms_to_wanted_Nm, 0.15 * hand.rms_Nm);
   EXPECT_TRUE(run.record.has("truth_joint_angle_rad"));
@@ -125,7 +130,188 @@ TEST(ImpedanceTracking, WorksWithEveryTube) {
   }
 }
 
-TEST(ImpedanceTracking, RefusesWhatIsNotPassiveOrNotAHarmonicDrive) {
+struct Task {
+  const char* actuator;
+  double stiffness_Nm_rad;
+  double damping_Nms_rad;
+};
+
+class EveryActuator : public testing::TestWithParam<Task> {};
+
+TEST_P(EveryActuator, RendersAnImpedance) {
+  const Task& task = GetParam();
+  const ImpedanceRun run = track_impedance(data_sheet(task.actuator),
+                                           {.kind = ImpedanceSpec::Kind::wanted,
+                                            .stiffness_Nm_rad = task.stiffness_Nm_rad,
+                                            .damping_Nms_rad = task.damping_Nms_rad,
+                                            .duration_s = 10.0},
+                                           1);
+  EXPECT_DOUBLE_EQ(run.stiffness_Nm_rad, task.stiffness_Nm_rad);
+  // The friction of the drive keeps a share of the torque: the more, the smaller the actuator is.
+  EXPECT_NEAR(std::abs(at(run, 0.2).rendered_Nm_rad), task.stiffness_Nm_rad,
+              0.6 * task.stiffness_Nm_rad);
+  EXPECT_NEAR(at(run, 0.1).linear_Nm_rad.real(), task.stiffness_Nm_rad,
+              0.02 * task.stiffness_Nm_rad);
+  EXPECT_GT(run.passive_to_Hz, ImpedanceRun::kPassiveSpringTo_Hz);
+  EXPECT_GE(run.largest_passive_Nm_rad, task.stiffness_Nm_rad);
+  EXPECT_LT(run.hand.max_Nm, data_sheet(task.actuator).rating.torque_Nm.value);
+  EXPECT_GT(run.hand.joint_range_deg, 1.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryActuator,
+                         testing::Values(Task{"dfki-28", 60.0, 2.0}, Task{"dfki-50", 100.0, 5.0},
+                                         Task{"dfki-120", 200.0, 10.0},
+                                         Task{"dfki-300", 400.0, 10.0},
+                                         Task{"elastomer", 15.0, 0.5},
+                                         Task{"rubber-clutch", 0.5, 0.02},
+                                         Task{"harmonic-drive", 1000.0, 30.0}),
+                         [](const auto& each) {
+                           std::string name = each.param.actuator;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+// What an error proposes is what it accepts.
+TEST(ImpedanceTracking, ProposesStableGains) {
+  for (const char* actuator :
+       {"dfki-28", "dfki-50", "dfki-120", "dfki-300", "elastomer", "rubber-clutch"}) {
+    const DataSheet sheet = data_sheet(actuator);
+    const double stiff_Nm_rad = 0.9 * series_elastic_joint(sheet).stiffness_Nm_rad;
+    const auto refusal = [&](double stiffness_Nm_rad, double damping_Nms_rad) {
+      return test::error_message([&] {
+        static_cast<void>(track_impedance(sheet,
+                                          {.kind = ImpedanceSpec::Kind::wanted,
+                                           .stiffness_Nm_rad = stiffness_Nm_rad,
+                                           .damping_Nms_rad = damping_Nms_rad,
+                                           .duration_s = 10.0},
+                                          1));
+      });
+    };
+    const std::string message = refusal(stiff_Nm_rad, 0.0);
+    const auto number_after = [&](const std::string& words) {
+      const std::size_t at = message.find(words);
+      return at == std::string::npos ? 0.0 : std::stod(message.substr(at + words.size()));
+    };
+    const double least_Nm_rad = number_after("at most ");
+    const double softer_Nm_rad = number_after("for example ");
+    ASSERT_GT(least_Nm_rad + softer_Nm_rad, 0.0) << actuator << ": " << message;
+    if (least_Nm_rad > 0.0) {
+      EXPECT_EQ(refusal(least_Nm_rad, 0.0), "") << actuator;
+    } else {
+      EXPECT_EQ(refusal(softer_Nm_rad, number_after("Nm/rad with ")), "") << actuator;
+    }
+    const double damping_Nms_rad = number_after("a damping from ");
+    if (damping_Nms_rad > 0.0) {
+      EXPECT_EQ(refusal(stiff_Nm_rad, damping_Nms_rad), "") << actuator;
+    }
+  }
+}
+
+Dataset recordings_of(const char* actuator, const ExperimentSpec& spec, int count) {
+  Dataset dataset;
+  for (int n = 0; n < count; ++n) {
+    ExperimentSpec each = spec;
+    each.seed = static_cast<std::uint64_t>(n + 1);
+    if (spec.lever_m) each.lever_m = *spec.lever_m * (1.0 + 0.3 * n);
+    Recording recording = simulate(data_sheet(actuator), each);
+    const std::size_t samples = recording.size();
+    dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
+  }
+  return dataset;
+}
+
+ModelFile model_of(const Dataset& dataset, const char* family,
+                   const std::vector<std::string>& inputs) {
+  return train_model(dataset, {.family = family, .features = resolve_inputs(dataset, inputs)}, 1)
+      .file;
+}
+
+double error_up_to_1_Hz(const ImpedanceRun& run) {
+  double sum = 0.0;
+  for (const ImpedancePoint& point : run.points)
+    if (point.frequency_Hz <= 1.0)
+      sum += std::abs(point.rendered_Nm_rad - point.wanted_Nm_rad) / std::abs(point.wanted_Nm_rad);
+  return sum;
+}
+
+// The inverse of a learned spring with its hysteresis renders more exactly than a linear model.
+TEST(ImpedanceTracking, ALearnedInverseIsNearerToTheTask) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  Dataset dataset =
+      recordings_of("dfki-50", {.experiment = "sweep", .duration_s = 40.0, .lever_m = 0.1}, 2);
+  for (DatasetRecord& chirp :
+       recordings_of("dfki-50", {.experiment = "chirp", .duration_s = 60.0}, 1).records)
+    dataset.records.push_back(std::move(chirp));
+  const ModelFile file = model_of(dataset, "grey_box", {});
+  const std::vector<ImpedanceModel> models = {impedance_model("learned", file, sheet)};
+  EXPECT_EQ(models.front().reason, "");
+  const auto runs = track_impedances(sheet,
+                                     {.kind = ImpedanceSpec::Kind::wanted,
+                                      .stiffness_Nm_rad = 100.0,
+                                      .damping_Nms_rad = 5.0,
+                                      .duration_s = 20.0},
+                                     models, 1);
+  ASSERT_EQ(runs.size(), 2U);
+  EXPECT_EQ(runs.front().model, "linear");
+  EXPECT_LT(error_up_to_1_Hz(runs.back()), 0.85 * error_up_to_1_Hz(runs.front()));
+  EXPECT_LT(runs.back().hand.rms_to_wanted_Nm, 0.85 * runs.front().hand.rms_to_wanted_Nm);
+}
+
+// The friction of the harmonic drive is not in the tube, but in what a model has learned.
+TEST(ImpedanceTracking, AnEstimateCorrectsTheTorqueOfATube) {
+  const DataSheet sheet = data_sheet("harmonic-drive");
+  Dataset dataset = recordings_of(
+      "harmonic-drive",
+      {.experiment = "human-torque", .duration_s = 40.0, .is_impedance_zero = true}, 2);
+  for (DatasetRecord& high :
+       recordings_of("harmonic-drive", {.experiment = "human-torque", .duration_s = 40.0}, 1)
+           .records)
+    dataset.records.push_back(std::move(high));
+  const ModelFile file =
+      model_of(dataset, "grey_box",
+               {"motor_angle_rad / 2 - wave_generator_angle_rad", "motor_torque_Nm",
+                "lowpass(rate(wave_generator_angle_rad), 10Hz)"});
+  const std::vector<ImpedanceModel> models = {impedance_model("learned", file, sheet)};
+  EXPECT_NE(models.front().reason, "");
+  const ImpedanceSpec spec = {.kind = ImpedanceSpec::Kind::wanted,
+                              .stiffness_Nm_rad = 500.0,
+                              .damping_Nms_rad = 20.0,
+                              .duration_s = 20.0};
+  const auto runs = track_impedances(sheet, spec, models, 1);
+  EXPECT_LT(error_up_to_1_Hz(runs.back()), 0.5 * error_up_to_1_Hz(runs.front()));
+  EXPECT_LT(runs.back().hand.rms_to_wanted_Nm, 0.8 * runs.front().hand.rms_to_wanted_Nm);
+  // A correction as fast as the loop is not passive, and the error states the reason.
+  ImpedanceSpec fast = spec;
+  fast.correction_rad_s = 100.0;
+  const std::string refused =
+      test::error_message([&] { static_cast<void>(track_impedances(sheet, fast, models, 1)); });
+  EXPECT_NE(refused.find("the estimate corrects too fast"), std::string::npos) << refused;
+  EXPECT_NE(test::error_message([&] {
+              static_cast<void>(impedance_model("learned", file, data_sheet("dfki-50")));
+            }).find("inputs that its sensors measure"),
+            std::string::npos);
+}
+
+TEST(ImpedanceTracking, AModelWithoutAnInverseCorrectsTheTorqueOfASpring) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  const Dataset dataset = recordings_of("dfki-50", {.experiment = "chirp", .duration_s = 20.0}, 1);
+  const ImpedanceModel model = impedance_model("net", model_of(dataset, "mlp", {}), sheet);
+  EXPECT_EQ(model.name, "net");
+  EXPECT_NE(model.reason, "");
+  const ImpedanceRun run = track_impedance(sheet,
+                                           {.kind = ImpedanceSpec::Kind::wanted,
+                                            .stiffness_Nm_rad = 100.0,
+                                            .damping_Nms_rad = 5.0,
+                                            .duration_s = 10.0},
+                                           model, 1);
+  EXPECT_EQ(run.model, "net");
+  EXPECT_NEAR(std::abs(at(run, 0.2).rendered_Nm_rad), 100.0, 40.0);
+  const auto json = nlohmann::json::parse(impedance_json(run));
+  EXPECT_EQ(json.at("model"), "net");
+  EXPECT_GT(json.at("gains").at("proportional_A_rad"), 0.0);
+}
+
+TEST(ImpedanceTracking, RefusesWhatIsNotPassive) {
   const auto refusal = [](const char* actuator, const ImpedanceSpec& spec) {
     return test::error_message(
         [&] { static_cast<void>(track_impedance(data_sheet(actuator), spec, 1)); });
@@ -133,8 +319,9 @@ TEST(ImpedanceTracking, RefusesWhatIsNotPassiveOrNotAHarmonicDrive) {
   const auto expect = [](const std::string& message, const std::string& words) {
     EXPECT_NE(message.find(words), std::string::npos) << words << " in: " << message;
   };
-  expect(refusal("dfki-50", kSoft),
-         "torsion tube before its harmonic drive, harmonic-drive, found dfki-50");
+  expect(refusal("dfki-50", {}),
+         "gains are those of paper 004 for harmonic-drive; expected a "
+         "stiffness for dfki-50, found high");
   const auto wanted = [](double stiffness_Nm_rad, double damping_Nms_rad, double gain_Nm_rad) {
     return ImpedanceSpec{.kind = ImpedanceSpec::Kind::wanted,
                          .stiffness_Nm_rad = stiffness_Nm_rad,
@@ -145,11 +332,7 @@ TEST(ImpedanceTracking, RefusesWhatIsNotPassiveOrNotAHarmonicDrive) {
   expect(stiff, "not passive up to 10 Hz; expected at most 9");
   expect(stiff, "found 12000 Nm/rad");
   expect(refusal("harmonic-drive", wanted(1000.0, 0.0, 5.0)), "no stiffness is passive");
-  EXPECT_EQ(test::error_message([&] {
-              static_cast<void>(
-                  impedance_settings(data_sheet("harmonic-drive"), wanted(12000.0, 20.0, 0.5)));
-            }),
-            "")
+  EXPECT_EQ(refusal("harmonic-drive", wanted(12000.0, 20.0, 0.5)), "")
       << "damping extends the range";
   expect(refusal("harmonic-drive", wanted(-1.0, 0.0, 0.5)), "0 Nm/rad or more, found -1");
   expect(refusal("harmonic-drive", wanted(1.0, std::nan(""), 0.5)), "0 Nms/rad or more, found nan");

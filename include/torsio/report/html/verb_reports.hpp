@@ -73,8 +73,9 @@ namespace torsio {
 [[nodiscard]] ReportDocument tracking_report(std::span<const TrackingRow> rows,
                                              const Recording* record);
 
-/// Wanted, linear and rendered impedance as Bode and Nyquist diagrams, and the motion of the hand.
-[[nodiscard]] ReportDocument impedance_report(const ImpedanceRun& run);
+/// Wanted, linear and rendered impedance of each model as Bode and Nyquist diagrams, and the motion of
+/// the hand with the first. @param runs at least one, of the same task
+[[nodiscard]] ReportDocument impedance_report(std::span<const ImpedanceRun> runs);
 
 /// Scores of the joints, the arm drawn from the side and from above in poses of the run, torques of all joints.
 /// @param summary sentences
