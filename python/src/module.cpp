@@ -71,6 +71,7 @@ PYBIND11_MODULE(_core, module) {
   bind_batches(module);
   bind_learning(module);
   bind_control(module);
+  bind_impedance(module);
   bind_supervision(module);
   bind_imports(module);
   bind_drives(module);

@@ -43,7 +43,7 @@ def test_an_import_with_guards_is_that_of_the_program(tmp_path, weights, sweep):
     )
     run(
         tmp_path, "import", str(weights), "--inputs", ", ".join(INPUTS), "--rate", "1000Hz", "--activation", "tanh",
-        "--output-scale", "0.5", "--guards", "sweep.csv", "--serial", "elbow-7", "-o", "joint.safetensors",
+        "--output-scale", "0.5", "--guards", "sweep.csv", "--device-serial", "elbow-7", "-o", "joint.safetensors",
     )  # fmt: skip
     theirs = torsio.load(tmp_path / "joint.safetensors")
     assert json.loads(mine.description_json()) == json.loads(theirs.description_json())

@@ -119,7 +119,7 @@ def test_an_adaptation_is_that_of_the_program(bench):
     model = torsio.load(folder / "spring.safetensors")
     adapted, scores = torsio.adapt(model, folder / "c.csv", held_out=0.25, embargo_s=0.5, serial="J-07")
     theirs = document(
-        folder, "adapt", "spring.safetensors", "c.csv", "--held-out", "0.25", "--embargo", "0.5s", "--serial", "J-07",
+        folder, "adapt", "spring.safetensors", "c.csv", "--held-out", "0.25", "--embargo", "0.5s", "--device-serial", "J-07",
         "-o", "adapted.safetensors",
     )  # fmt: skip
     assert theirs.pop("model") == "spring.safetensors" and scores.document.pop("model") == ""

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from . import link, plot
     from ._drives import DriveParameter, IdentifiedDrive, identify, read_drive
     from ._learning import attribute, check, compare, crossvalidate, drift, evaluate, fit, import_network, transfer
-    from ._loops import Tracking, margins, track
+    from ._loops import ImpedanceTracking, Tracking, margins, track, track_impedance
     from ._progress import progress
     from ._results import (
         CheckReport,
@@ -97,6 +97,7 @@ __all__ = [
     "Finding",
     "FoldSummary",
     "IdentifiedDrive",
+    "ImpedanceTracking",
     "Load",
     "Margins",
     "Model",
@@ -134,6 +135,7 @@ __all__ = [
     "simulate",
     "sweep_dataset",
     "track",
+    "track_impedance",
     "transfer",
 ]
 
@@ -142,7 +144,7 @@ __all__ = [
 _LATER = {
     "_drives": "DriveParameter IdentifiedDrive identify read_drive",
     "_learning": "attribute check compare crossvalidate drift evaluate fit import_network transfer",
-    "_loops": "Tracking margins track",
+    "_loops": "ImpedanceTracking Tracking margins track track_impedance",
     "_progress": "progress",
     "_results": "CheckReport Comparison CrossValidation Document Estimates Finding FoldSummary Margins Results Score",
     "_supervision": "Adaptation MonitorReport MonitorSource adapt calibrate_monitor calibrate_simulated_monitor"

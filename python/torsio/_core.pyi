@@ -406,6 +406,19 @@ def track(
     seeds: Sequence[int],
     is_recorded: bool,
 ) -> tuple[str, Recording | None]: ...
+def track_impedance(
+    actuator: str,
+    impedance: str | float,
+    models: Sequence[tuple[str, Model]],
+    damping_Nms_rad: float,
+    torque_gain_Nm_rad: float | None,
+    bandwidth_rad_s: float | None,
+    loop_damping: float | None,
+    correction_rad_s: float,
+    amplitude_Nm: float | None,
+    duration_s: float,
+    seed: int,
+) -> tuple[str, list[Recording]]: ...
 def margins(
     actuator: str, bandwidth_rad_s: float, damping: float, load_inertia_kg_m2: float
 ) -> list[tuple[str, bool, float, float, float, float, float]]: ...

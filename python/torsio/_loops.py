@@ -10,7 +10,7 @@ from typing import Any, Union
 from . import _core
 from ._core import Model, Recording, UsageError
 from ._progress import Listener, shown
-from ._results import Document, Margins
+from ._results import Document, Margins, _data_frame, _document, _number, _table_html, _table_text
 
 #: A YAML schedule of faults (docs/simulation/faults.md), or texts such as "gear_angle=freeze@2s..4s", "kt=-20%@3s".
 Faults = Union[str, "PathLike[str]", Sequence[str], None]
@@ -98,6 +98,88 @@ def track(
         text, signals = _core.track(actuator, list((models or {}).items()), call, list(seeds), record)
     document = Document.from_json(text, "results")
     return Tracking(document.document, document.table, signals)
+
+
+@dataclass(frozen=True, repr=False)
+class ImpedanceTracking:
+    """What `track_impedance` found: a run without a model and one with each."""
+
+    document: dict[str, Any]  #: of `torsio track --impedance --json`
+    records: list[Recording]  #: of each run the motion of a hand, with the `truth_` channels
+
+    @property
+    def runs(self) -> list[dict[str, Any]]:
+        """Of each run: model, gains, passive_to_Hz, largest_passive_stiffness_Nm_rad, frequencies, hand."""
+        runs: list[dict[str, Any]] = self.document.get("runs", [self.document])
+        return runs
+
+    def _rows(self) -> list[dict[str, Any]]:
+        rows = []
+        for run in self.runs:
+            for point in run["frequencies"]:
+                row = {"model": run["model"] or "none", "frequency_Hz": point["frequency_Hz"]}
+                for each in ("wanted", "linear", "rendered"):
+                    row[f"{each}_Nm_rad"] = point[each]["magnitude_Nm_rad"]
+                    row[f"{each}_phase_deg"] = _number(point[each]["phase_deg"])
+                rows.append(row)
+        return rows
+
+    def to_pandas(self) -> Any:
+        """A DataFrame with a row for each run and frequency: sizes and phases of torque over angle."""
+        return _data_frame(self._rows())
+
+    def _cells(self) -> tuple[Sequence[str], list[list[Any]], str]:
+        rows = self._rows()
+        return list(rows[0]), [list(row.values()) for row in rows], "impedance"
+
+    def __repr__(self) -> str:
+        return _table_text(*self._cells())
+
+    def _repr_html_(self) -> str:
+        return _table_html(*self._cells())
+
+
+def track_impedance(
+    actuator: str = "harmonic-drive",
+    impedance: str | float = "high",
+    models: Mapping[str, Model] | None = None,
+    *,
+    damping_Nms_rad: float = 0.0,
+    torque_gain_Nm_rad: float | None = None,
+    bandwidth_rad_s: float | None = None,
+    loop_damping: float | None = None,
+    correction_rad_s: float = 6.0,
+    amplitude_Nm: float | None = None,
+    duration_s: float = 60.0,
+    seed: int = 1,
+    progress: Listener | None = None,
+) -> ImpedanceTracking:
+    """A stiffness and a damping at the output of a simulated joint, tau = K q + D dq/dt (docs/simulation/tracking.md).
+
+    impedance: K in Nm/rad, with damping_Nms_rad; "zero", or for harmonic-drive "high" (gains of paper 004).
+    models: each is the inverse of the spring in a run of its own, or, where it has none, its estimate corrects the
+    torque within correction_rad_s. Without models there is one run.
+    torque_gain_Nm_rad: K_tp of the inner loop, only with a torsion tube (harmonic-drive).
+    bandwidth_rad_s, loop_damping: of the torque loop through the spring, without a torsion tube.
+    amplitude_Nm: of the sines at the output. duration_s: of the motion of a hand, 10 to 3600.
+    Errors: UsageError for an impedance that is unstable, or with a torsion tube not passive up to 10 Hz: the message
+    states the largest stiffness that is. Equal arguments give equal results.
+    """
+    with shown(progress):
+        text, records = _core.track_impedance(
+            actuator,
+            impedance,
+            list((models or {}).items()),
+            damping_Nms_rad,
+            torque_gain_Nm_rad,
+            bandwidth_rad_s,
+            loop_damping,
+            correction_rad_s,
+            amplitude_Nm,
+            duration_s,
+            seed,
+        )
+    return ImpedanceTracking(_document(text), records)
 
 
 def margins(
