@@ -22,9 +22,14 @@ export function angle_factor(label: string): number {
   return is_degrees && is_angle(label) ? kDegrees : 1;
 }
 
-/** A label of an axis, or the name of a channel, in the present unit. */
-export function angle_text(text: string): string {
-  return is_degrees ? text.replace(kUnit, "[deg$1]").replace(kSuffix, "_deg") : text;
+/** The name of a channel of an axis with angles in the present unit. */
+export function angle_channel(name: string): string {
+  return is_degrees ? name.replace(kSuffix, "_deg") : name;
+}
+
+/** A label of an axis in the present unit; one without a unit of angles stays as it is. */
+export function angle_text(label: string): string {
+  return is_degrees && is_angle(label) ? angle_channel(label.replace(kUnit, "[deg$1]")) : label;
 }
 
 export function scaled(values: Float32Array, factor: number): Float32Array {

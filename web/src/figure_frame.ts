@@ -95,7 +95,7 @@ export function add_legend(
   frame: Frame,
   entries: LegendEntry[],
   toggle: (index: number, shown: boolean) => void,
-): (name_of: (label: string) => string) => void {
+): (name_of: (label: string, index: number) => string) => void {
   const legend = document.createElement("div");
   legend.className = "legend";
   legend.setAttribute("role", "group");
@@ -116,5 +116,5 @@ export function add_legend(
     return name;
   });
   frame.toolbar.after(legend);
-  return (name_of) => names.forEach((name, index) => (name.textContent = name_of(entries[index].label)));
+  return (name_of) => names.forEach((name, index) => (name.textContent = name_of(entries[index].label, index)));
 }

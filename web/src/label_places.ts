@@ -25,6 +25,8 @@ const kLineCost = 12;
 /** A label that another point is nearly as close to as its own. */
 const kDoubtCost = 25;
 const kDoubtRadius = 8;
+/** A line from a label to its point that crosses another label or point. */
+const kLeaderCost = 20;
 
 export function overlap(a: Box, b: Box): boolean {
   return a.left < b.left + b.width && b.left < a.left + a.width && a.top < b.top + b.height && b.top < a.top + a.height;
@@ -89,7 +91,9 @@ export function place_labels(
         const crossed = lines.filter(([from, to]) => crosses(box, from, to)).length;
         const near = { ...box, left: box.left - kDoubtRadius, width: box.width + 2 * kDoubtRadius };
         const doubtful = points.filter((other, i) => i !== index && crosses(near, other, other)).length;
-        const cost = distance + turn + kLineCost * crossed + kDoubtCost * doubtful;
+        const middle: Point = [box.left + box.width / 2, box.top + box.height / 2];
+        const hit = ring === 0 ? 0 : taken.filter((other, i) => i !== index && crosses(other, point, middle)).length;
+        const cost = distance + turn + kLineCost * crossed + kDoubtCost * doubtful + kLeaderCost * hit;
         if (cost < least) [best, least] = [{ ...box, is_far: ring > 0 }, cost];
       });
     });

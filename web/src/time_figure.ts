@@ -1,5 +1,5 @@
 import uPlot from "uplot";
-import { angle_factor, angle_text, on_angle_unit, scaled } from "./angles";
+import { angle_channel, angle_factor, angle_text, is_angle, on_angle_unit, scaled } from "./angles";
 import type { TimeFigure, TimePanel, TimeSeries } from "./document";
 import { add_controls, add_legend, kRest_ms, make_frame } from "./figure_frame";
 import type { Frame, LegendEntry, View } from "./figure_frame";
@@ -78,7 +78,7 @@ export class TimeView implements View {
     new ResizeObserver(() => this.resize()).observe(this.frame.canvas);
     on_theme(() => this.panels.forEach(({ plot }) => plot.redraw(false)));
     const use_angle_unit = () => {
-      rename(angle_text);
+      rename((name, index) => (is_angle(figure.panels[entries[index].at[0][0]].label) ? angle_channel(name) : name));
       for (const panel of this.panels) {
         panel.plot.axes[1].label = angle_text(panel.label);
         panel.drawn = null;

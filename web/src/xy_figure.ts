@@ -4,7 +4,7 @@ import { add_controls, add_legend, kRest_ms, make_frame } from "./figure_frame";
 import type { Frame, View } from "./figure_frame";
 import type { Box } from "./label_places";
 import { Scale, scale_of } from "./scale";
-import { element, kLineHeight, kNamespace, text_width } from "./svg_elements";
+import { element, kLabelSize, kLineHeight, kNamespace, kTickSize, shortened, text_width } from "./svg_elements";
 import { on_theme, series_colour, series_dash } from "./theme";
 import { linear_ticks, log_ticks, tick_text } from "./ticks";
 import { column_step, draw_point_names, draw_series } from "./xy_series";
@@ -57,30 +57,26 @@ export class XyView implements View, Plane {
     this.svg.setAttribute("aria-label", figure.title);
     this.frame.canvas.append(this.svg);
     add_controls(this.frame, this);
-    const rename =
-      this.drawn.length > 1
-        ? add_legend(
-            this.frame,
-            this.drawn.map((one) => ({ label: one.series.label, colour: one.css, shown: one.shown })),
-            (index, shown) => {
-              this.drawn[index].shown = shown;
-              this.draw();
-            },
-          )
-        : () => {};
-    const use_unit = () => {
-      rename(angle_text);
-      this.use_angle_unit();
-    };
-    use_unit();
+    if (this.drawn.length > 1)
+      add_legend(
+        this.frame,
+        this.drawn.map((one) => ({ label: one.series.label, colour: one.css, shown: one.shown })),
+        (index, shown) => {
+          this.drawn[index].shown = shown;
+          this.draw();
+        },
+      );
+    this.use_angle_unit();
     this.reset();
     this.drag_to_zoom();
     new ResizeObserver(() => {
-      if (this.frame.canvas.clientWidth !== this.width) this.draw();
+      if (this.frame.canvas.clientWidth === this.width) return;
+      if (this.is_fitted) this.fit();
+      this.draw();
     }).observe(this.frame.canvas);
     on_theme(() => this.draw());
     on_angle_unit(() => {
-      use_unit();
+      this.use_angle_unit();
       this.reset();
     });
   }
@@ -284,17 +280,17 @@ export class XyView implements View, Plane {
       element(this.svg, "line", { x1: kLeft, x2: right, y1: y, y2: y, class: "grid" });
       element(this.svg, "text", { x: kLeft - 6, y: y + 4, class: "tick end" }).textContent = tick_text(tick);
     }
-    element(this.svg, "text", {
-      x: 0.5 * (kLeft + right),
-      y: this.height - 8,
-      class: "label middle",
-    }).textContent = angle_text(figure.x.label);
     const middle = 0.5 * (kTop + bottom);
-    element(this.svg, "text", {
-      x: 14,
-      y: middle,
-      transform: `rotate(-90 14 ${middle})`,
-      class: "label middle",
-    }).textContent = angle_text(figure.y.label);
+    this.write_label({ x: 0.5 * this.width, y: this.height - 8 }, this.width, figure.x.label);
+    const upright = { x: 14, y: middle, transform: `rotate(-90 14 ${middle})` };
+    this.write_label(upright, 2 * Math.min(middle, this.height - middle), figure.y.label);
+  }
+
+  /** The label of an axis, shortened where it has no room; the whole of it is its title. */
+  private write_label(at: Record<string, string | number>, room: number, label: string): void {
+    const text = angle_text(label);
+    const written = element(this.svg, "text", { ...at, class: "label middle" });
+    written.textContent = shortened(text, room - 8, kLabelSize / kTickSize);
+    if (written.textContent !== text) element(written, "title", {}).textContent = text;
   }
 }
