@@ -73,14 +73,15 @@ std::vector<std::string> cells_of(const DesignAlternative& row, std::size_t colu
   return cells;
 }
 
-std::string text_of(const DesignTable& of, bool has_reasons) {
+/// The table, and the reasons that are not printed already.
+std::string text_of(const DesignTable& of, const std::string& printed) {
   TextTable table;
   const auto headings = headings_of(of);
   table.header(headings);
   for (const DesignAlternative& row : of.rows) table.row(cells_of(row, headings.size()));
   std::string text = table.text();
   for (const DesignAlternative& row : of.rows)
-    if (has_reasons && !row.infeasible.empty()) text += row.infeasible + "\n";
+    if (printed.find(row.infeasible) == std::string::npos) text += row.infeasible + "\n";
   return text;
 }
 
@@ -152,8 +153,7 @@ std::string design_text(const DesignReport& report) {
                  figure.remark});
     text += table.text() + "\n";
   }
-  for (const DesignTable& table : report.tables)
-    text += text_of(table, report.is_feasible) + "\n";  // else `infeasible` has the reasons
+  for (const DesignTable& table : report.tables) text += text_of(table, report.infeasible) + "\n";
   for (const std::string& note : report.notes) text += note + "\n";
   return text;
 }

@@ -112,6 +112,14 @@ TEST(DesignedSpring, KindsAreComparedInATable) {
     EXPECT_NEAR(row.figures.at(0).value, 1e3 * kinds[i].mass_kg, 1e-9);
   }
   EXPECT_EQ(chosen, 1);
+  // Where the kind does not fit, the others are compared, and each reason is there once.
+  demand.bore_m = 0.01;
+  const auto with_bore = design_springs(demand);
+  const std::string text =
+      design_text(spring_report(demand, with_bore.front(), with_bore));  // a rod has no bore
+  EXPECT_EQ(text.find("rod: infeasible"), text.rfind("rod: infeasible")) << text;
+  EXPECT_EQ(text.find("chosen"), std::string::npos) << text;
+  demand.bore_m = 0.0;
   demand.largest_diameter_m = 0.08;
   const auto narrow = design_springs(demand);
   EXPECT_NE(narrow[2].infeasible.find(
