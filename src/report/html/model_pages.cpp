@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "report/fit_report.hpp"
@@ -91,7 +92,7 @@ XyFigure training_figure(const std::vector<TrainingEpoch>& history) {
              .y = {}});
     }
     last = epoch.epoch;
-    const double errors[] = {epoch.training_error, epoch.held_out_error};
+    const std::array errors = {epoch.training_error, epoch.held_out_error};
     for (std::size_t k = 0; k < 2; ++k) {
       XySeries& series = figure.series[figure.series.size() - 2 + k];
       series.x.push_back(static_cast<double>(epoch.epoch));

@@ -73,20 +73,20 @@ void FigurePainter::text(const std::string& text, double x, double y, Align alig
 
 double FigurePainter::head(const std::string& title, const std::vector<LegendEntry>& entries,
                            const PlotArea& area) {
-  double y = area.top + PlotLengths::line_height;
+  double y = area.top + PlotLengths::kLineHeight;
   text(title, area.left + 2.0, y, Align::begin);
-  double height = PlotLengths::line_height + 4.0;
+  double height = PlotLengths::kLineHeight + 4.0;
   if (entries.size() < 2) return height;
   constexpr double kSample = 14.0;
   double x = area.left + 2.0;
-  y += PlotLengths::line_height;
-  height += PlotLengths::line_height;
+  y += PlotLengths::kLineHeight;
+  height += PlotLengths::kLineHeight;
   for (const LegendEntry& entry : entries) {
     const double width = kSample + 3.0 + text_width(entry.label) + 8.0;
     if (x > area.left + 2.0 && x + width > area.left + area.width) {
       x = area.left + 2.0;
-      y += PlotLengths::line_height;
-      height += PlotLengths::line_height;
+      y += PlotLengths::kLineHeight;
+      height += PlotLengths::kLineHeight;
     }
     use_pen(entry.role, entry.index);
     const bool is_line = entry.style == CurveStyle::line;
@@ -109,7 +109,7 @@ double FigurePainter::head(const std::string& title, const std::vector<LegendEnt
 double FigurePainter::left_margin(const PlotAxis& y) const {
   double widest = 0.0;
   for (const PlotAxis::Tick& tick : y.ticks()) widest = std::max(widest, text_width(tick.text));
-  return widest + kTickLength + 2.0 + PlotLengths::line_height + 3.0;
+  return widest + kTickLength + 2.0 + PlotLengths::kLineHeight + 3.0;
 }
 
 void FigurePainter::axes(const PlotAxis& x, const PlotAxis& y, const ReportAxis& x_axis,
@@ -138,11 +138,11 @@ void FigurePainter::axes(const PlotAxis& x, const PlotAxis& y, const ReportAxis&
     for (const PlotAxis::Tick& tick : x.ticks()) {
       const double half = 0.5 * text_width(tick.text);
       if (x.at(tick.value) - half < free_from) continue;
-      text(tick.text, x.at(tick.value), bottom + PlotLengths::text + 2.0, Align::middle);
+      text(tick.text, x.at(tick.value), bottom + PlotLengths::kText + 2.0, Align::middle);
       free_from = x.at(tick.value) + half + 3.0;
     }
     text(x_axis.label, frame.left + 0.5 * frame.width,
-         bottom + PlotLengths::text + PlotLengths::line_height + 3.0, Align::middle);
+         bottom + PlotLengths::kText + PlotLengths::kLineHeight + 3.0, Align::middle);
   }
   text(y_axis.label, frame.left - widest - 6.0, frame.top + 0.5 * frame.height, Align::middle,
        true);

@@ -14,9 +14,9 @@ namespace torsio {
 
 /// Lengths of a picture, in points.
 struct PlotLengths {
-  static constexpr double text = 7.0;
-  static constexpr double line_height = 9.5;
-  static constexpr double bottom = 24.0;  ///< for the numbers and the label of the horizontal axis
+  static constexpr double kText = 7.0;
+  static constexpr double kLineHeight = 9.5;
+  static constexpr double kBottom = 24.0;  ///< for the numbers and the label of the horizontal axis
 };
 
 /// Cairo writes a coordinate of SVG with up to six digits; of a sixteenth these are at most four.

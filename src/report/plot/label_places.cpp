@@ -19,6 +19,8 @@ constexpr double kLineCost = 6.0;
 /// A label that another point is nearly as close to as its own.
 constexpr double kDoubtCost = 12.0;
 constexpr double kDoubtRadius = 4.0;
+/// A line from a label to its point that crosses another label or point.
+constexpr double kLeaderCost = 10.0;
 
 bool do_overlap(const PlotArea& a, const PlotArea& b) {
   return a.left < b.left + b.width && b.left < a.left + a.width && a.top < b.top + b.height &&
@@ -73,6 +75,7 @@ std::vector<std::optional<LabelPlace>> place_labels(
     const std::vector<PlotPoint>& points, const std::vector<LabelSize>& sizes, const PlotArea& area,
     const std::vector<std::pair<PlotPoint, PlotPoint>>& lines) {
   std::vector<PlotArea> taken;
+  taken.reserve(2 * points.size());
   for (const PlotPoint& point : points)
     taken.push_back({.left = point.x - kPointRadius,
                      .top = point.y - kPointRadius,
@@ -85,7 +88,7 @@ std::vector<std::optional<LabelPlace>> place_labels(
                return do_overlap(box, other);
              });
     };
-    const auto cost_of = [&](const PlotArea& box) {
+    const auto cost_of = [&](const PlotArea& box, bool is_far) {
       PlotArea near = box;
       near.left -= kDoubtRadius;
       near.width += 2.0 * kDoubtRadius;
@@ -93,6 +96,9 @@ std::vector<std::optional<LabelPlace>> place_labels(
       for (const auto& [from, to] : lines) cost += do_cross(box, from, to) ? kLineCost : 0.0;
       for (std::size_t k = 0; k < points.size(); ++k)
         if (k != i && do_cross(near, points[k], points[k])) cost += kDoubtCost;
+      const PlotPoint middle{box.left + 0.5 * box.width, box.top + 0.5 * box.height};
+      for (std::size_t k = 0; k < taken.size() && is_far; ++k)
+        if (k != i && do_cross(taken[k], points[i], middle)) cost += kLeaderCost;
       return cost;
     };
     double least = std::numeric_limits<double>::infinity();
@@ -100,7 +106,8 @@ std::vector<std::optional<LabelPlace>> place_labels(
       for (std::size_t turn = 0; turn < kDirections_deg.size(); ++turn) {
         const PlotArea box = box_at(points[i], kDirections_deg[turn], kDistances[ring], sizes[i]);
         if (!is_free(box)) continue;
-        const double cost = kDistances[ring] + kTurnCost * static_cast<double>(turn) + cost_of(box);
+        const double cost =
+            kDistances[ring] + kTurnCost * static_cast<double>(turn) + cost_of(box, ring > 0);
         if (cost >= least) continue;
         least = cost;
         places[i] = LabelPlace{.box = box, .is_far = ring > 0};

@@ -38,13 +38,13 @@ double FigurePainter::colour_scale(const FieldFigure& figure, double left, doubl
     const auto [red, green, blue] = shade_colour(shade);
     cairo_set_source_rgb(cairo_, red, green, blue);
     cairo_rectangle(cairo_, left + 8.0 + 2.0 * static_cast<double>(shade), top, 2.0,
-                    PlotLengths::text);
+                    PlotLengths::kText);
     cairo_fill(cairo_);
   }
-  text("0", left, top + PlotLengths::text - 1.0, Align::begin);
+  text("0", left, top + PlotLengths::kText - 1.0, Align::begin);
   text(fmt::format("{:.3g} {}", figure.highest, figure.value_label), left + 8.0 + kWidth + 4.0,
-       top + PlotLengths::text - 1.0, Align::begin);
-  return PlotLengths::line_height + 4.0;
+       top + PlotLengths::kText - 1.0, Align::begin);
+  return PlotLengths::kLineHeight + 4.0;
 }
 
 void FigurePainter::draw(const FieldFigure& figure, const PlotArea& area) {

@@ -124,7 +124,7 @@ void FigurePainter::draw(const TimeFigure& figure, const PlotArea& area) {
       {figure.start_s, figure.start_s + static_cast<double>(figure.samples) / figure.rate_Hz},
       false, false, left, left + width);
   const double height =
-      (area.height - head_height - PlotLengths::bottom) / static_cast<double>(panels.size());
+      (area.height - head_height - PlotLengths::kBottom) / static_cast<double>(panels.size());
   double top = area.top + head_height;
   for (const TimeFigure::Panel* one : panels) {
     panel(figure, *one, entries, x, {left, top, width, height - kBetween}, one == panels.back());

@@ -103,8 +103,8 @@ void FigurePainter::column_names(const XySeries& series, const PlotAxis& x, cons
     const double right = frame.left + frame.width + 5.0 - half;
     const double at = std::max(std::min(x.at(series.x[i]), right), half + 2.0);
     text(series.names[i], at,
-         frame.top + frame.height + PlotLengths::text + 2.0 +
-             PlotLengths::line_height * static_cast<double>(i % rows),
+         frame.top + frame.height + PlotLengths::kText + 2.0 +
+             PlotLengths::kLineHeight * static_cast<double>(i % rows),
          Align::middle);
   }
 }
@@ -157,9 +157,9 @@ void FigurePainter::draw(const XyFigure& figure, const PlotArea& area) {
   PlotArea frame{.left = area.left,
                  .top = area.top + head_height,
                  .width = area.width,
-                 .height = area.height - head_height - PlotLengths::bottom};
+                 .height = area.height - head_height - PlotLengths::kBottom};
   const std::size_t rows = name_rows(named, 0.9 * area.width);
-  if (rows > 1) frame.height -= PlotLengths::line_height * static_cast<double>(rows - 1);
+  if (rows > 1) frame.height -= PlotLengths::kLineHeight * static_cast<double>(rows - 1);
   frame.left += left_margin(
       PlotAxis(y_range, figure.y.is_logarithmic, true, frame.top + frame.height, frame.top));
   frame.width = area.left + area.width - 6.0 - frame.left;

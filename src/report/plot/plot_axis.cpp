@@ -14,10 +14,8 @@ namespace {
 constexpr double kTickSpace = 20.0;  ///< width of a tick with its number, in points
 
 /// The first digits of the ticks within each power of ten, from few ticks to many.
-const std::array<std::vector<double>, 5>& digits_of_ticks() {
-  static const std::array<std::vector<double>, 5> kDigits = {
-      {{1}, {1, 3}, {1, 2, 5}, {1, 2, 3, 5, 7}, {1, 2, 3, 4, 5, 6, 7, 8, 9}}};
-  return kDigits;
+std::array<std::vector<double>, 5> digits_of_ticks() {
+  return {{{1}, {1, 3}, {1, 2, 5}, {1, 2, 3, 5, 7}, {1, 2, 3, 4, 5, 6, 7, 8, 9}}};
 }
 
 std::vector<double> ticks_with(const std::vector<double>& digits, const PlotRange& decades,
