@@ -236,6 +236,7 @@ void Checker::check_frozen() {
         }
       }
     });
+    for_each_record([&](std::size_t r) { check_dead_angle(r); });
     check_switched_off();
   });
 }

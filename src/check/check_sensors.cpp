@@ -198,6 +198,31 @@ void Checker::check_held() {
   });
 }
 
+// An encoder that is dead: a locked output does not move either, but then the torque follows the other angle.
+void Checker::check_dead_angle(std::size_t r) {
+  constexpr double kLeastMotion_rad = 0.1;
+  constexpr double kFollowsOther = 0.5;
+  if (spoiled_[r] != 0 || sources_.size() != 2 || order_of_difference(r) == 0) return;
+  const Recording& recording = dataset_.records[r].recording;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Channel& dead = recording.channel(sources_[k]);
+    const Channel& other = recording.channel(sources_[1 - k]);
+    const double moved_rad = inner_range(other.values);
+    if (extent_of(dead.values).width() != 0.0 || moved_rad < kLeastMotion_rad) continue;
+    const double together = correlation(other.values, pairs_[r].target);
+    if (moved_rad < kWidestTwist_rad && std::abs(together) > kFollowsOther) continue;
+    spoiled_[r] = 1;
+    add(Verdict::fail, "frozen sensors", recording.name(),
+        fmt::format(
+            "{} is {:g} in all samples, while {} moves through {:.3g} rad (correlation with "
+            "{} {:.2f})",
+            dead.name, dead.values.front(), other.name, moved_rad, dataset_.target, together),
+        "Its sensor is dead, or another column was taken for it: check its cable and bus. A spring "
+        "does not twist so far.");
+    return;
+  }
+}
+
 // A torque sensor without supply or with a channel that saturates in its amplifier shows noise.
 void Checker::check_switched_off() {
   for_each_record([&](std::size_t r) {

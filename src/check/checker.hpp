@@ -116,6 +116,7 @@ class Checker {
   [[nodiscard]] bool is_offset_on(std::size_t r, const std::string& name) const;
   void check_held();
   void check_switched_off();
+  void check_dead_angle(std::size_t r);
   [[nodiscard]] bool has_lost_sign(std::size_t r);
   void check_limit(std::size_t r);
   void check_hidden_torque();

@@ -315,6 +315,16 @@ TEST(Check, WarnsOfATorqueThatFreezesWhileTheDeflectionMoves) {
   EXPECT_EQ(verdict_of(findings, "frozen sensors"), Verdict::warn);
 }
 
+TEST(Check, FailsOnAnEncoderThatNeverMovesWhileTheOtherDoes) {
+  for (const char* const dead : {"joint_angle_rad", "gear_angle_rad"}) {
+    const auto findings = findings_of(with_record(
+        changed(dead, [](Channel& channel) { std::ranges::fill(channel.values, 0.25); })));
+    ASSERT_EQ(verdict_of(findings, "frozen sensors"), Verdict::fail) << text_of(findings);
+    EXPECT_NE(first_of(findings, "frozen sensors").message.find(std::string(dead) + " is 0.25"),
+              std::string::npos);
+  }
+}
+
 TEST(Check, ReportsOnceThatALockedOutputDoesNotMove) {
   Recording good = bench_recording("locked");
   Recording recording("locked", 1000.0);

@@ -391,6 +391,47 @@ TEST(Mapping, HoldingBeginsWhereEveryHeldChannelHasAValue) {
   EXPECT_NE(message.find("nothing was measured in log"), std::string::npos) << message;
 }
 
+TEST(Mapping, ReadsUnitsAsPeopleWriteThem) {
+  const auto converted = [](const std::string& channel, const std::string& unit) {
+    const std::string si = channel.substr(0, channel.find(':'));
+    return read("t_s,x\n0,1\n1,1\n", "channels: {" + si + ": {from: x, unit: " + unit + "}}")[0]
+        .channel(si)
+        .values[0];
+  };
+  for (const char* const deg : {"\"(deg)\"", "[deg]", "\"\u00b0\"", "_deg", "Deg", "degrees"})
+    EXPECT_NEAR(converted("joint_angle_rad", deg), 0.0174533, 1e-6) << deg;
+  for (const char* const torque : {"N\u00b7m", "N.m", "\"N m\"", "\"[Nm]\"", "N-m"})
+    EXPECT_EQ(converted("torque_Nm", torque), 1.0) << torque;
+  EXPECT_EQ(converted("state_1", "_1"), 1.0);
+  EXPECT_NEAR(converted("joint_speed_rad_s", "RPM"), 0.1047198, 1e-6);
+}
+
+TEST(Mapping, AnswersUnitsThatItDoesNotReadBeforeItListsTheOthers) {
+  const auto refusal = [](const std::string& channel, const std::string& unit) {
+    return test::error_message([&] {
+      (void)read("t_s,x\n0,1\n1,1\n", "channels: {" + channel + ": {from: x, unit: " + unit + "}}");
+    });
+  };
+  EXPECT_NE(refusal("joint_angle_rad", "counts").find("unit: rev, scale: 1/COUNTS"),
+            std::string::npos);
+  const std::string torque = refusal("torque_Nm", "nm");
+  const std::size_t answer = torque.find("Did you mean 'Nm'?");
+  ASSERT_NE(answer, std::string::npos) << torque;
+  EXPECT_LT(answer, torque.find("_pct")) << torque;
+  EXPECT_NE(refusal("torque_Nm", "\"\"").find("expected text"), std::string::npos);
+}
+
+TEST(Mapping, WithoutUnitsProposesARuleForEachColumnBeforeTheListOfUnits) {
+  const std::string message =
+      test::error_message([&] { (void)read("t,torque,enc [counts]\n0,1,2\n1,2,3\n"); });
+  const std::size_t units = message.find("_pct");
+  ASSERT_NE(units, std::string::npos) << message;
+  for (const char* const line :
+       {"3 columns have no unit: t, torque, enc [counts]", "torque_Nm: {from: torque, unit: Nm}",
+        "enc_rad: {from: \"enc [counts]\", unit: rev, scale: 1/COUNTS}", "torsio map log"})
+    EXPECT_LT(message.find(line), units) << line << "\n" << message;
+}
+
 TEST(Mapping, OfChannelsLeavesOutColumnsWithoutAUnitThatItDoesNotName) {
   const Recording recording =
       read("t_s,tau,state,adc0,q_rad\n0,1,2,3,4\n1,2,3,4,5\n", "channels: {torque_Nm: tau}")[0];

@@ -27,6 +27,16 @@ std::string_view name_without_unit(const ColumnSummary& summary) {
   return name;
 }
 
+/// "theta_m" is an angle of the motor, not one in metres; a position may be in metres.
+bool ends_in_letter(const ColumnSummary& summary) {
+  if (summary.unit_origin != UnitOrigin::name || summary.unit.size() != 1 || summary.unit == "1")
+    return false;
+  const NameReading reading = read_name(name_without_unit(summary));
+  const std::string_view si = si_unit_of(reading.quantity);
+  return !si.empty() && !reading.word.starts_with("pos") &&
+         reading.quantity != Quantity::temperature && si != find_unit(summary.unit)->si_suffix;
+}
+
 void require_numbers(const LogTable& table) {
   const bool has_numbers = std::ranges::any_of(table.columns, [](const LogColumn& column) {
     return std::ranges::any_of(column.values, [](double x) { return std::isfinite(x); });
@@ -141,8 +151,15 @@ MappingDraft draft_mapping(const LogTable& table) {
   require_numbers(table);
   DraftWork work{.table = table, .draft = {.file = table.source.file}, .readings = {}};
   for (ColumnSummary& summary : column_summaries(table)) {
+    const bool is_word = ends_in_letter(summary);
+    if (is_word) {
+      summary.unit.clear();
+      summary.unit_origin = UnitOrigin::none;
+    }
     work.readings.push_back(read_name(name_without_unit(summary)));
     work.draft.columns.push_back({.summary = std::move(summary)});
+    if (is_word)
+      work.draft.columns.back().reasons.emplace_back("name: its last letter is not its unit");
   }
   work.draft.not_read = table.not_read;
   guess_clock(work);

@@ -24,11 +24,15 @@ struct Word {
 
 /// Units as loggers spell them.
 constexpr auto kSpellings = std::to_array<Word>({
-    {"radians", "rad"}, {"radian", "rad"},   {"degrees", "deg"}, {"degree", "deg"},
-    {"seconds", "s"},   {"second", "s"},     {"sec", "s"},       {"msec", "ms"},
-    {"usec", "us"},     {"amps", "A"},       {"amp", "A"},       {"ampere", "A"},
-    {"volts", "V"},     {"volt", "V"},       {"nm", "Nm"},       {"newtonmeter", "Nm"},
-    {"hz", "Hz"},       {"celsius", "degC"}, {"lbfft", "lbft"},  {"ftlb", "lbft"},
+    {"radians", "rad"},     {"radian", "rad"},     {"rad", "rad"},         {"degrees", "deg"},
+    {"degree", "deg"},      {"deg", "deg"},        {"turns", "rev"},       {"turn", "rev"},
+    {"revolutions", "rev"}, {"seconds", "s"},      {"second", "s"},        {"sec", "s"},
+    {"msec", "ms"},         {"usec", "us"},        {"rad/sec", "rad_s"},   {"deg/sec", "deg_s"},
+    {"deg/s", "deg_s"},     {"turns/s", "rev_s"},  {"rpm", "rpm"},         {"rev/min", "rpm"},
+    {"1/min", "rpm"},       {"u/min", "rpm"},      {"amps", "A"},          {"amp", "A"},
+    {"ampere", "A"},        {"volts", "V"},        {"volt", "V"},          {"nm", "Nm"},
+    {"n-m", "Nm"},          {"newtonmeter", "Nm"}, {"newtonmeters", "Nm"}, {"hz", "Hz"},
+    {"celsius", "degC"},    {"lbfft", "lbft"},     {"ftlb", "lbft"},
 });
 
 /// Quantities and the SI unit that they are kept in.
@@ -227,9 +231,14 @@ std::string advice_on_written_unit(std::string_view written, std::string_view si
                      "Counts have no size of their own: write  unit: {}, scale: FACTOR  "
                      "with the {} of one count",
                      si_unit, si_unit == "1" ? "value" : si_unit);
-  std::vector<std::string_view> names;
-  for (const Unit& unit : known_units()) names.push_back(unit.suffix);
-  const std::string nearest = did_you_mean(without_frame(written), names);
+  std::vector<std::string_view> names;  // those that fit: 'ns' is not meant by 'nm'
+  for (const Unit& unit : known_units())
+    if (unit.si_suffix == si_unit) names.push_back(unit.suffix);
+  const std::string_view text = without_frame(written);
+  const auto* const same = std::ranges::find(kSpellings, lower(text), &Word::word);
+  const std::string nearest = same != kSpellings.end()
+                                  ? fmt::format("Did you mean '{}'?", same->meaning)
+                                  : did_you_mean(text, names);
   return (nearest.empty() ? "" : nearest + " ") +
          fmt::format(
              "Another unit is read as  unit: {0}, scale: FACTOR  with the {0} of one of "

@@ -18,7 +18,7 @@ namespace {
 
 /// Also `[ms]`, which YAML reads as a list.
 std::string written_unit(const YamlValue& yaml) {
-  if (yaml.is_scalar()) return yaml.text();
+  if (!yaml.is_list()) return yaml.text();
   const std::vector<std::string> texts = yaml.texts();
   if (texts.size() != 1) yaml.refuse("one unit, such as deg");
   return texts.front();

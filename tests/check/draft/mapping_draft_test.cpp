@@ -105,6 +105,15 @@ TEST(MappingDraft, EstimatesTheGearRatioWithTheSpringBetweenTheAngles) {
   EXPECT_EQ(draft.of("gear_angle_rad")->certainty, Certainty::sure);
 }
 
+TEST(MappingDraft, TakesALetterAtTheEndForTheSideAndNotForMetres) {
+  const MappingDraft draft = draft_of(joint_log("t,theta_m,q_l,tau_s"));
+  ASSERT_NE(draft.of("gear_angle_rad"), nullptr) << draft.yaml();
+  EXPECT_EQ(draft.of("gear_angle_rad")->rule(),
+            "gear_angle_rad: {from: theta_m, unit: rad, gear_ratio: 80}");
+  ASSERT_NE(draft.of("torque_Nm"), nullptr) << draft.yaml();
+  EXPECT_EQ(draft.of("torque_Nm")->rule(), "torque_Nm: {from: tau_s, unit: Nm}");
+}
+
 TEST(MappingDraft, InvertsATorqueThatFallsWithTheDeflection) {
   const MappingDraft draft = draft_of(joint_log("t_s,motor_rad,joint_rad,torque_Nm", -1.0));
   ASSERT_NE(draft.of("torque_Nm"), nullptr);
