@@ -88,16 +88,16 @@ std::string line_on_drafts(const LogTable& table) {
 void refuse_columns_without_unit(const LogTable& table, const std::set<const LogColumn*>& used) {
   std::vector<std::string> names;
   std::vector<std::string> sound;
-  const LogColumn* first = nullptr;
+  std::vector<const LogColumn*> without;
   for (const LogColumn& column : table.columns) {
     if (column.has_unit() || column.time != TimeKind::none || used.contains(&column)) {
       sound.push_back(column.name);
       continue;
     }
-    if (first == nullptr) first = &column;
+    without.push_back(&column);
     names.push_back(column.name);
   }
-  if (names.size() == 1) refuse_one(table, *first);
+  if (without.size() == 1) refuse_one(table, *without.front());
   if (!names.empty()) refuse_several(table, names, sound);
 }
 
