@@ -3,9 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <string_view>
 #include <vector>
 
+#include "studies/studies.hpp"
+#include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/fit/families.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -39,6 +46,77 @@ std::vector<std::string> part_names(const CLI::App& verb) {
   return names;
 }
 
+/// The names that an argument can have, which the shell offers besides files; empty: only files.
+std::string actuator_words() {
+  std::vector<std::string> words;
+  for (const torsio::DataSheet& sheet : torsio::data_sheets()) {
+    words.push_back(sheet.name);
+    for (const std::string_view variant : sheet.variants)
+      if (!variant.empty()) words.push_back(fmt::format("{}:{}", sheet.name, variant));
+  }
+  return fmt::format("{}", fmt::join(words, " "));
+}
+
+std::string experiment_words() {
+  std::set<std::string_view> names;
+  for (const torsio::ExperimentInfo& info : torsio::experiments()) names.insert(info.name);
+  return fmt::format("{}", fmt::join(names, " "));
+}
+
+std::string family_words() {
+  std::vector<std::string_view> names;
+  for (const torsio::FamilyInfo& family : torsio::families()) names.push_back(family.name);
+  return fmt::format("{}", fmt::join(names, " "));
+}
+
+std::string study_words() {
+  std::vector<std::string_view> names;
+  for (const torsio::StudyInfo& study : torsio::studies()) names.push_back(study.name);
+  return fmt::format("{}", fmt::join(names, " "));
+}
+
+/// An argument of a verb whose values have names.
+struct NamedValues {
+  std::string verb;
+  std::string argument;  ///< an option with its dashes, or the place of a positional: "1"
+  std::string words;
+};
+
+std::vector<NamedValues> named_values(const CLI::App& app) {
+  std::vector<NamedValues> all = {{"simulate", "1", actuator_words()},
+                                  {"simulate", "2", experiment_words()},
+                                  {"simulate", "--describe", actuator_words()},
+                                  {"joint", "1", actuator_words()},
+                                  {"fit", "--model", family_words()},
+                                  {"drift", "--model", family_words()},
+                                  {"reproduce", "1", study_words()},
+                                  {"completion", "1", "bash zsh fish"},
+                                  {"track", "--joint-output", "locked free"},
+                                  {"track", "--acts-on", "current velocity"}};
+  std::vector<std::string_view> references(torsio::reference_names().begin(),
+                                           torsio::reference_names().end());
+  all.push_back({"track", "--reference", fmt::format("{}", fmt::join(references, " "))});
+  for (const CLI::App* verb : verbs_of(app)) {
+    const std::string name = verb->get_name();
+    if (verb->get_option_no_throw("--actuator") != nullptr)
+      all.push_back({name, "--actuator", actuator_words()});
+    if (verb->get_option_no_throw("--models") != nullptr)
+      all.push_back({name, "--models", "all search " + family_words()});
+  }
+  return all;
+}
+
+/// The values after an option and in the places of positionals.
+std::string bash_values(const CLI::App& app) {
+  std::string cases;
+  for (const NamedValues& each : named_values(app))
+    cases += each.argument.starts_with("-") ? fmt::format("    '{} {} '*) values='{}' ;;\n",
+                                                          each.verb, each.argument, each.words)
+                                            : fmt::format("    '{} '*' {}') values='{}' ;;\n",
+                                                          each.verb, each.argument, each.words);
+  return cases;
+}
+
 /// The options of a verb and, where it has verbs below it, a case for each of those.
 std::string bash_words(const CLI::App& verb) {
   std::string own = fmt::format("words='{}'", fmt::join(option_names(verb), " "));
@@ -61,15 +139,17 @@ std::string bash_script(const CLI::App& app) {
   }
   return fmt::format(
       "_torsio() {{\n"
-      "  local current=${{COMP_WORDS[COMP_CWORD]}} words parts\n"
+      "  local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}}\n"
+      "  local words parts values place=$((COMP_CWORD - 1))\n"
       "  case ${{COMP_WORDS[1]}} in\n{}  esac\n"
+      "  case \"${{COMP_WORDS[1]}} $before $place\" in\n{}  esac\n"
       "  if ((COMP_CWORD == 1)); then words='{}{}'\n"
       "  elif ((COMP_CWORD == 2)) && [[ $parts && $current != -* ]]; then words=$parts\n"
-      "  elif [[ $current != -* ]]; then return; fi\n"
+      "  elif [[ $current != -* ]]; then words=$values; fi\n"
       "  COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
       "}}\n"
       "complete -o default -F _torsio torsio\n",
-      cases, verbs, fmt::join(option_names(app), " "));
+      cases, bash_values(app), verbs, fmt::join(option_names(app), " "));
 }
 
 /// As `bash_words`.
@@ -81,6 +161,17 @@ std::string zsh_words(const CLI::App& verb) {
     cases += fmt::format("        {}) compadd -- {} ;;\n", part->get_name(),
                          fmt::join(option_names(*part), " "));
   return fmt::format("case $words[3] in\n{}        *) {} ;;\n      esac", cases, own);
+}
+
+/// As `bash_values`; files are offered as well.
+std::string zsh_values(const CLI::App& app) {
+  std::string cases;
+  for (const NamedValues& each : named_values(app))
+    cases += each.argument.starts_with("-") ? fmt::format("      '{} {} '*) compadd -- {} ;;\n",
+                                                          each.verb, each.argument, each.words)
+                                            : fmt::format("      '{} '*' {}') compadd -- {} ;;\n",
+                                                          each.verb, each.argument, each.words);
+  return cases;
 }
 
 std::string zsh_script(const CLI::App& app) {
@@ -99,13 +190,16 @@ std::string zsh_script(const CLI::App& app) {
       "#compdef torsio\n_torsio() {{\n  local -a verbs=(\n{}  )\n"
       "  if ((CURRENT == 2)); then\n    _describe verb verbs\n"
       "  elif [[ $words[CURRENT] == -* ]]; then\n    case $words[2] in\n{}    esac\n"
-      "  elif ((CURRENT == 3)); then\n    case $words[2] in\n{}      *) _files ;;\n    esac\n"
-      "  else\n    _files\n  fi\n}}\ncompdef _torsio torsio\n",
-      verbs, cases, parts);
+      "  else\n    if ((CURRENT == 3)); then\n      case $words[2] in\n{}      esac\n    fi\n"
+      "    case \"$words[2] $words[CURRENT-1] $((CURRENT - 2))\" in\n{}    esac\n"
+      "    _files\n  fi\n}}\ncompdef _torsio torsio\n",
+      verbs, cases, parts, zsh_values(app));
 }
 
 /// @param condition when the options apply, for example that a verb was typed
-std::string fish_options(const CLI::App& verb, const std::string& condition) {
+/// @param values of the whole program
+std::string fish_options(const CLI::App& verb, const std::string& condition,
+                         const std::vector<NamedValues>& values) {
   std::string script;
   for (const CLI::Option* option : verb.get_options()) {
     if (option->get_group().empty() || option->get_positional()) continue;
@@ -113,6 +207,9 @@ std::string fish_options(const CLI::App& verb, const std::string& condition) {
     for (const std::string& name : option->get_snames()) script += " -s " + name;
     for (const std::string& name : option->get_lnames()) script += " -l " + name;
     if (option->get_items_expected_max() > 0) script += " -r";
+    for (const NamedValues& each : values)
+      if (each.verb == verb.get_name() && each.argument == option->get_name())
+        script += fmt::format(" -a '{}'", each.words);
     script += fmt::format(" -d {}\n", quoted(option->get_description()));
   }
   return script;
@@ -120,18 +217,25 @@ std::string fish_options(const CLI::App& verb, const std::string& condition) {
 
 std::string fish_script(const CLI::App& app) {
   std::string script;
+  const std::vector<NamedValues> values = named_values(app);
   for (const CLI::App* verb : verbs_of(app)) {
     const std::string is_typed = "__fish_seen_subcommand_from " + verb->get_name();
     script += fmt::format("complete -c torsio -n __fish_use_subcommand -a {} -d {}\n",
                           verb->get_name(), quoted(verb->get_description()));
-    script += fish_options(*verb, is_typed);
+    script += fish_options(*verb, is_typed, values);
+    for (const NamedValues& each : values)
+      if (each.verb == verb->get_name() && !each.argument.starts_with("-"))
+        script += fmt::format(
+            "complete -c torsio -n '{}; and test (count (commandline -opc)) -eq {}' -a '{}'\n",
+            is_typed, std::stoi(each.argument) + 1, each.words);
     const std::string parts = fmt::format("{}", fmt::join(part_names(*verb), " "));
     for (const CLI::App* part : verbs_of(*verb)) {
       script += fmt::format(
           "complete -c torsio -n '{0}; and not __fish_seen_subcommand_from {1}' -a {2} -d {3}\n",
           is_typed, parts, part->get_name(), quoted(part->get_description()));
       script += fish_options(
-          *part, fmt::format("{}; and __fish_seen_subcommand_from {}", is_typed, part->get_name()));
+          *part, fmt::format("{}; and __fish_seen_subcommand_from {}", is_typed, part->get_name()),
+          values);
     }
   }
   return script;

@@ -7,11 +7,15 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "common/output.hpp"
 #include "data/arrays/mat.hpp"
+#include "report/json_text.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/text_table.hpp"
@@ -86,40 +90,62 @@ std::string data_text() {
   return std::filesystem::is_directory(folder) ? folder : fmt::format("{}: no such folder", folder);
 }
 
-void run() {
+struct Found {
+  std::string what;
+  std::string found;
+  std::string advice;  ///< empty: none
+};
+
+std::vector<Found> inspect() {
   utsname system{};
   (void)::uname(&system);
   const std::string browser = program_in_path(
       {"chromium", "firefox", "firefox-esr", "google-chrome", "brave-browser", "xdg-open"});
-  torsio::TextTable table;
-  table.header({"what", "found", "advice"});
-  table.row({"torsio", torsio::kVersion, ""});
-  table.row({"model files", fmt::format("format {}", torsio::kModelFormatVersion), ""});
-  table.row({"kernel", fmt::format("{} {} {}", system.sysname, system.release, system.machine),
-             is_realtime_kernel()
-                 ? ""
-                 : "without PREEMPT_RT: expect late cycles (docs/robot/realtime.md)"});
-  table.row({"processor",
-             fmt::format("{} threads; {}", std::thread::hardware_concurrency(), instruction_sets()),
-             ""});
-  table.row({"memory", memory_text(), ""});
-  table.row({"real-time priority", may_use_realtime_priority() ? "allowed" : "not allowed",
-             may_use_realtime_priority() ? "" : "rtprio in /etc/security/limits.conf"});
-  table.row(
+  std::vector<Found> machine;
+  machine.push_back({"torsio", torsio::kVersion, ""});
+  machine.push_back({"model files", fmt::format("format {}", torsio::kModelFormatVersion), ""});
+  machine.push_back(
+      {"kernel", fmt::format("{} {} {}", system.sysname, system.release, system.machine),
+       is_realtime_kernel() ? ""
+                            : "without PREEMPT_RT: expect late cycles (docs/robot/realtime.md)"});
+  machine.push_back(
+      {"processor",
+       fmt::format("{} threads; {}", std::thread::hardware_concurrency(), instruction_sets()), ""});
+  machine.push_back({"memory", memory_text(), ""});
+  machine.push_back({"real-time priority", may_use_realtime_priority() ? "allowed" : "not allowed",
+                     may_use_realtime_priority() ? "" : "rtprio in /etc/security/limits.conf"});
+  machine.push_back(
       {"locked memory", limit_text(RLIMIT_MEMLOCK, 1024.0 * 1024.0, "MiB"),
        ::geteuid() == 0 ? "" : "a loop needs about 64 MiB: memlock in /etc/security/limits.conf"});
-  table.row({"recordings", data_text(), ""});
-  table.row({"browser", browser.empty() ? "none in PATH" : browser,
-             browser.empty() ? "reports are files: open them on another machine" : ""});
+  machine.push_back({"recordings", data_text(), ""});
+  machine.push_back({"browser", browser.empty() ? "none in PATH" : browser,
+                     browser.empty() ? "reports are files: open them on another machine" : ""});
   const bool has_matlab = torsio::has_mat_library();
-  table.row({"MATLAB files", has_matlab ? "read by libmatio" : "libmatio is not installed",
-             has_matlab ? "" : "to read them: apt-get install libmatio11"});
+  machine.push_back({"MATLAB files", has_matlab ? "read by libmatio" : "libmatio is not installed",
+                     has_matlab ? "" : "to read them: apt-get install libmatio11"});
   const std::string solver = program_in_path({"ccx"});
-  table.row({"CalculiX", solver.empty() ? "none in PATH" : solver,
-             solver.empty()
-                 ? "for design coupling and reproduce 003-coupling: apt-get install calculix-ccx"
-                 : ""});
-  print(table.text());
+  machine.push_back(
+      {"CalculiX", solver.empty() ? "none in PATH" : solver,
+       solver.empty()
+           ? "for design coupling and reproduce 003-coupling: apt-get install calculix-ccx"
+           : ""});
+  return machine;
+}
+
+void run(const JsonOutput& json) {
+  require_writable(json.destination);
+  torsio::TextTable table;
+  table.header({"what", "found", "advice"});
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const Found& each : inspect()) {
+    table.row({each.what, each.found, each.advice});
+    rows.push_back({{"what", each.what},
+                    {"found", each.found},
+                    {"advice", each.advice.empty() ? nlohmann::ordered_json(nullptr)
+                                                   : nlohmann::ordered_json(each.advice)}});
+  }
+  if (json.wants_tables()) print(table.text());
+  json.write(torsio::json_text(nlohmann::ordered_json{{"machine", std::move(rows)}}));
 }
 
 }  // namespace
@@ -129,5 +155,8 @@ void add_doctor(CLI::App& app) {
                                       "what this machine has for torsio: processor, real-time "
                                       "permissions, memory, browser, other programs");
   verb->footer("Example: torsio doctor");
-  verb->callback([] { run(); });
+  auto json = std::make_shared<JsonOutput>();
+  verb->add_option("--json", json->destination,
+                   "write the table as JSON to a file, or - for standard output");
+  verb->callback([json] { run(*json); });
 }

@@ -10,6 +10,7 @@
 //   TorqueController   torque reference -> motor current through the inverse of a model; `JointController` with limits
 //   MonitoredTorque    one torque from several estimates, with the faults of each; `JointStop` stops the joint
 
+#include "torsio/control/estimate_correction.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_stop.hpp"
 #include "torsio/control/model_inverse.hpp"

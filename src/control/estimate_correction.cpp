@@ -12,7 +12,7 @@ namespace torsio {
 namespace {
 
 constexpr auto kPlace = "estimate correction";
-constexpr double kFastest = 0.1;  // of the sample rate
+constexpr double kFastest = 0.1;  // share of the sample rate
 
 }  // namespace
 

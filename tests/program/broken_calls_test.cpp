@@ -52,8 +52,8 @@ TEST_F(BrokenCalls, NameTheNearestOfWhatThereIs) {
   };
   suggests("fitt a.csv", "fit");
   suggests("train a.csv", "fit");
-  expect_error(torsio("track -o rows.json"), kCallWasWrong,
-               "torsio: track: there is no option '-o'");
+  expect_error(torsio("attribute -o rows.json"), kCallWasWrong,
+               "torsio: attribute: there is no option '-o'");
   suggests("fit a.csv --modle linear -o m.safetensors", "--model");
   suggests("simulate dfki50 sweep -o a.csv", "dfki-50");
   suggests("simulate dfki-50:bouc-wenn sweep -o a.csv", "bouc-wen");

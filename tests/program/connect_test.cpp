@@ -69,8 +69,8 @@ TEST_F(Connect, ShowsRefusalsWithTheirReason) {
   EXPECT_EQ(connect("record -o missing/run.csv --for 0.1s").exit_code, kCallWasWrong);
   EXPECT_EQ(connect("get gain --joint 300").exit_code, kCallWasWrong);
   EXPECT_EQ(torsio("connect").exit_code, kCallWasWrong);
-  EXPECT_EQ(torsio("connect list --unix a --serial b").exit_code, kCallWasWrong);
-  EXPECT_THAT(torsio("connect list --serial missing").err, HasSubstr("cannot open"));
+  EXPECT_EQ(torsio("connect list --unix a --serial-line b").exit_code, kCallWasWrong);
+  EXPECT_THAT(torsio("connect list --serial-line missing").err, HasSubstr("cannot open"));
 }
 
 TEST_F(Connect, WatchesAndRecordsTelemetry) {

@@ -52,7 +52,7 @@ TEST_F(DriftVerb, ReportsAnAgedJointAndNotASoundOne) {
 }
 
 TEST_F(DriftVerb, RefusesBadInput) {
-  calibrate("--serial J-07");
+  calibrate("--device-serial J-07");
   expect_refused("drift", kCallWasWrong, "no model file");
   expect_refused("drift joint.safetensors", kCallWasWrong, "REC");
   expect_refused("drift joint.safetensors same.csv --device-serial J-08", kWorkFailed, "J-08");

@@ -146,7 +146,7 @@ TEST_F(JointDaemon, RefusesWrongCalls) {
                                 "dfki-28 --arm arm6",
                                 "--arm arm6 --link-mass 1kg",
                                 "dfki-28 --link-mass 50kg",
-                                "--unix a --serial b",
+                                "--unix a --serial-line b",
                                 "--baud 9600",
                                 "--fast --realtime",
                                 "--duration 0s",

@@ -160,7 +160,8 @@ TEST_F(MainJob, AdaptsANetworkToAnotherJoint) {
     ASSERT_EQ(torsio(std::string("simulate 'harmonic-drive:soft'") + call).exit_code, 0);
   ASSERT_EQ(torsio("fit first.csv --model gru -o joint.safetensors" + inputs).exit_code, 0);
   const Outcome adapt = torsio(
-      "adapt joint.safetensors third.csv -o third.safetensors --serial three --json out.json");
+      "adapt joint.safetensors third.csv -o third.safetensors --device-serial three --json "
+      "out.json");
   ASSERT_EQ(adapt.exit_code, 0) << adapt.err;
   for (const char* word : {"as it ran", "held out", "warming_up", "roll-backs"})
     EXPECT_NE(adapt.out.find(word), std::string::npos) << adapt.out;

@@ -143,6 +143,18 @@ TEST_F(FirstMinute, BenchMeasuresAStepOfEachModel) {
     EXPECT_NE(outcome.out.find(what), std::string::npos) << what;
 }
 
+TEST_F(FirstMinute, MachinesReadTheMachineAndTheTimes) {
+  const auto machine = nlohmann::json::parse(torsio("doctor --json -").out);
+  EXPECT_EQ(machine.at("schema_version"), 1);
+  EXPECT_EQ(machine.at("machine").at(0).at("what"), "torsio");
+  ASSERT_EQ(torsio("bench --models linear --loop-rate 2kHz --json b.json").exit_code, 0);
+  const auto times = nlohmann::json::parse(contents("b.json"));
+  EXPECT_EQ(times.at("loop_rate_Hz"), 2000.0);
+  EXPECT_EQ(times.at("models").at(0).at("model"), "linear");
+  EXPECT_GT(times.at("models").at(0).at("step_p999_ns"), 0.0);
+  EXPECT_EQ(torsio("bench --loop-rate 2000").exit_code, kCallWasWrong) << "a rate has its unit";
+}
+
 TEST_F(FirstMinute, CompletionKnowsTheVerbsAndTheirOptions) {
   const Outcome bash = shell("{torsio} completion bash > c && bash -n c && cat c");
   EXPECT_EQ(bash.exit_code, 0) << bash.err;
@@ -150,9 +162,24 @@ TEST_F(FirstMinute, CompletionKnowsTheVerbsAndTheirOptions) {
       "bash -c '. ./c; COMP_WORDS=(torsio compare --rep); COMP_CWORD=2; _torsio; echo "
       "${COMPREPLY[@]}'");
   EXPECT_EQ(completed.out, "--report\n") << completed.err;
+  const auto complete = [this](const std::string& words, int place) {
+    return shell("bash -c '. ./c; COMP_WORDS=(torsio " + words +
+                 "); COMP_CWORD=" + std::to_string(place) + "; _torsio; echo ${COMPREPLY[@]}'")
+        .out;
+  };
+  EXPECT_EQ(complete("simulate dfki-28", 2),
+            "dfki-28 dfki-28:maxwell-slip dfki-28:bouc-wen dfki-28:lugre\n");
+  EXPECT_EQ(complete("simulate dfki-50 static", 3), "static-cycle\n");
+  EXPECT_EQ(complete("fit a.csv --model grey", 4), "grey_box\n");
+  EXPECT_EQ(complete("compare a.csv --models maxw", 4), "maxwell_slip\n");
+  EXPECT_EQ(complete("track --actuator harmonic-drive:so", 3), "harmonic-drive:soft\n");
+  EXPECT_EQ(complete("reproduce 001-mod", 2), "001-models\n");
+  EXPECT_EQ(complete("design spr", 2), "spring\n");
+  EXPECT_EQ(complete("fit a.c", 2), "\n") << "the shell completes files";
   for (const char* shell_name : {"bash", "zsh", "fish"}) {
     const Outcome script = torsio(std::string("completion ") + shell_name);
-    for (const char* word : {"crossvalidate", "allow-leak", "report"})
+    for (const char* word :
+         {"crossvalidate", "allow-leak", "report", "grey_box", "harmonic-drive:soft"})
       EXPECT_NE(script.out.find(word), std::string::npos) << shell_name << " " << word;
   }
   EXPECT_EQ(torsio("completion tcsh").exit_code, kCallWasWrong);

@@ -20,7 +20,7 @@ TEST_F(TrackVerb, ComparesAModelWithTheLineAndRecordsTheLoop) {
   ASSERT_EQ(torsio("fit a.csv --model linear_coulomb -o m.safetensors").exit_code, 0);
   const std::string call =
       "track --actuator dfki-50 --duration 8s --model m.safetensors --seeds 2 ";
-  const Outcome table = torsio(call + "--record loop.csv --json rows.json");
+  const Outcome table = torsio(call + "-o loop.csv --json rows.json");
   ASSERT_EQ(table.exit_code, 0) << table.err;
   for (const char* word : {"chirp of 13 Nm", "linear", "m.safetensors", "-3 dB Hz", "2 runs"})
     EXPECT_NE(table.out.find(word), std::string::npos) << table.out;
@@ -70,15 +70,16 @@ TEST_F(TrackVerb, WarnsOfAModelOfAnotherActuator) {
 }
 
 TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
-  expect_error(torsio("track --output out.csv"), kCallWasWrong,
-               "Results are written with --json FILE");
-  expect_error(torsio("track --record run.tsr"), kCallWasWrong, "a file that ends in .csv or .gz");
+  expect_error(torsio("track --joint-output out.csv"), kCallWasWrong,
+               "expected locked or free, found 'out.csv'");
+  expect_error(torsio("track -o run.tsr"), kCallWasWrong, "a file that ends in .csv or .gz");
   expect_error(torsio("track --model a.safetensors --model a.safetensors"), kCallWasWrong,
                "a.safetensors is given twice");
   expect_error(torsio("track --bandwidth 50Nm"), kCallWasWrong, "--bandwidth");
   expect_error(torsio("track --actuator elastomer"), kCallWasWrong, "series-elastic");
   expect_error(torsio("track --amplitude 130Nm"), kCallWasWrong, "the 120 Nm that dfki-120 is");
-  expect_error(torsio("track --output free --amplitude 70Nm"), kCallWasWrong, "tip the lever over");
+  expect_error(torsio("track --joint-output free --amplitude 70Nm"), kCallWasWrong,
+               "tip the lever over");
   expect_error(torsio("track --lever 0.5m"), kCallWasWrong, "the output is locked");
   expect_error(torsio("track --reference replay"), kCallWasWrong, "--replay");
   expect_error(torsio("track --bandwidth 300Hz"), kWorkFailed, "phase margin");
@@ -105,7 +106,7 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
   expect_error(torsio("track --limits position=0.3rad..-0.1rad"), kCallWasWrong,
                "lower limit comes first");
   expect_error(torsio("track --limits ''"), kCallWasWrong, "expected a value, found an empty text");
-  expect_error(torsio("track --record ''"), kCallWasWrong, "--record");
+  expect_error(torsio("track -o ''"), kCallWasWrong, "--output");
   expect_error(torsio("track --acts-on torque"), kCallWasWrong, "expected current or velocity");
   expect_error(torsio("track --seeds 0"), kCallWasWrong, "1 to 100");
   expect_error(torsio("track --model none.safetensors"), kWorkFailed, "none.safetensors");
@@ -148,7 +149,7 @@ TEST_F(TrackVerb, TuneLoopProposesGainsWithTheirMarginsOrRefuses) {
 
 TEST_F(TrackVerb, RendersAnImpedance) {
   const std::string call = "track --impedance 2000Nm_rad --impedance-damping 30Nms_rad ";
-  const Outcome table = torsio(call + "--duration 10s --json run.json --record run.csv");
+  const Outcome table = torsio(call + "--duration 10s --json run.json -o run.csv");
   ASSERT_EQ(table.exit_code, 0) << table.err;
   for (const char* word : {"harmonic-drive (stiff), impedance of 2000 Nm/rad and 30 Nms/rad",
                            "passive up to", "rendered / linear", "force at 0.5 m"})
@@ -203,7 +204,7 @@ TEST_F(TrackVerb, RefusesContradictionsOfTheImpedance) {
   refused("--impedance zero --torque-gain 1Nm_rad", "the gains of --impedance zero");
   refused("--impedance-damping 1Nms_rad", "no impedance is controlled");
   refused("--torque-gain 1Nm_rad", "no impedance is controlled");
-  for (const std::string flag : {"--reference chirp", "--output free", "--lever 0.5m",
+  for (const std::string flag : {"--reference chirp", "--joint-output free", "--lever 0.5m",
                                  "--friction 0.5", "--observer 8Hz", "--feed-forward", "--seeds 2"})
     refused("--impedance high " + flag,
             flag.substr(0, flag.find(' ')) + ": it belongs to the torque loop");

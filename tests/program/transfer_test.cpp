@@ -29,7 +29,8 @@ class TransferVerb : public Program {
 TEST_F(TransferVerb, MakesAModelOfTheNewJoint) {
   const Outcome outcome = torsio(
       "transfer base.safetensors new.csv --test walk.csv --base-actuator dfki-120 --actuator "
-      "dfki-50 --curve 5s,10s --plot curve.svg --serial J-11 -o new.safetensors --json t.json");
+      "dfki-50 --curve 5s,10s --plot curve.svg --device-serial J-11 -o new.safetensors --json "
+      "t.json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   for (const char* const text : {"data_sheets", "scaled", "refit", "chosen", "10 s of new data",
                                  "Learning curve, RMSE in Nm"})

@@ -201,7 +201,7 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedMod
     if (flags.output != "free")
       throw torsio::UsageError({.place = "--lever",
                                 .problem = "the output is locked",
-                                .advice = "Give --output free, too."});
+                                .advice = "Give --joint-output free, too."});
     spec.lever_m = torsio::signed_quantity_with_unit(flags.lever, "m", "--lever");
   }
   if (!flags.bandwidth.empty())
@@ -259,21 +259,19 @@ void check(TrackFlags& flags) {
                               .expected = fmt::format("1 to {}", kMaxSeeds),
                               .found = fmt::format("{}", flags.seeds)});
   if (!flags.record.empty() && flags.models.size() > 1)
-    throw torsio::UsageError({.place = "--record",
+    throw torsio::UsageError({.place = "--output",
                               .expected = "one --model",
                               .found = fmt::format("{}", flags.models.size()),
                               .advice = "Call track once for each model that is to be recorded."});
-  require_ending("--record", flags.record, {".csv", ".gz"});
+  require_ending("--output", flags.record, {".csv", ".gz"});
   for (auto model = flags.models.begin(); model != flags.models.end(); ++model)
     if (std::find(flags.models.begin(), model, *model) != model)
       throw torsio::UsageError({.place = "--model", .problem = *model + " is given twice"});
 }
 
-/// Refuses other values of `--output`; the message names the options that write files.
 std::string refuse_output(const std::string& text) {
   if (text == "locked" || text == "free") return {};
-  return "expected locked or free for the joint's output, found '" + text +
-         "'. Results are written with --json FILE, the loop's signals with --record FILE.csv";
+  return "expected locked or free, found '" + text + "'";
 }
 
 std::string refuse_actuation(const std::string& text) {
@@ -365,8 +363,8 @@ void add_track(CLI::App& app) {
   verb->add_option("--actuator", flags->actuator,
                    "dfki-28 to dfki-300, as NAME:VARIANT#SERIAL, or a data sheet, FILE.yaml")
       ->capture_default_str();
-  verb->add_option("--output", flags->output,
-                   "output of the joint: locked, or free with a lever and 9 kg; not a file")
+  verb->add_option("--joint-output", flags->output,
+                   "output of the joint: locked, or free with a lever and 9 kg")
       ->check(refuse_output)
       ->capture_default_str();
   verb->add_option("--lever", flags->lever,
@@ -407,7 +405,7 @@ void add_track(CLI::App& app) {
   add_seed(*verb, flags->seed, "seed of the first run's sensor noise and of a random walk");
   verb->add_option("--seeds", flags->seeds, "runs of each model, seed after seed")
       ->capture_default_str();
-  verb->add_option("--record", flags->record,
+  verb->add_option("-o,--output,--record", flags->record,
                    "write all signals of the loop and each term of its command in the first run of "
                    "the only --model as CSV");
   verb->add_option("--json", flags->json.destination,

@@ -110,9 +110,9 @@ void ImpedanceFlags::check(const CLI::App& verb) const {
                               .problem = "no impedance is controlled",
                               .expected = "a stiffness, --impedance 2000Nm_rad"});
   if (impedance.empty()) return;
-  for (const char* flag : {"--output", "--lever", "--reference", "--replay", "--mapping", "--rate",
-                           "--friction", "--observer", "--feed-forward", "--limits", "--acts-on",
-                           "--velocity-bandwidth", "--faults", "--seeds"})
+  for (const char* flag : {"--joint-output", "--lever", "--reference", "--replay", "--mapping",
+                           "--rate", "--friction", "--observer", "--feed-forward", "--limits",
+                           "--acts-on", "--velocity-bandwidth", "--faults", "--seeds"})
     if (is_given(flag))
       throw torsio::UsageError(
           {.place = flag,
@@ -120,7 +120,7 @@ void ImpedanceFlags::check(const CLI::App& verb) const {
            .expected = "one of the two loops",
            .advice = "With --impedance: --impedance-damping, --torque-gain, --model, "
                      "--correction, --bandwidth, --damping, --amplitude, --duration, --seed, "
-                     "--record, --json, --report."});
+                     "--output, --json, --report."});
 }
 
 void run_impedance(const ImpedanceFlags& flags, const SharedTrackFlags& shared) {

@@ -33,7 +33,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kRate_Hz = 1000.0;
 constexpr double kSpeedCutoff_Hz = 40.0;  // filter of the speed for the impedance's damping
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kContact_rad_s = kTurn;  // 1 Hz: contact with a person or a table
@@ -43,10 +42,11 @@ struct TuneFlags {
   std::string bandwidth = "7.96Hz";
   double damping = torsio::DeflectionController::Settings{}.damping;
   std::string observer;
-  double load_inertia_kg_m2 = 0.0;
+  std::string rate = "1kHz";
+  std::string load_inertia = "0kg_m2";
   std::string lowest;
   std::string highest;
-  double load_Nm = 0.0;
+  std::string load = "0Nm";
   std::string controller;
   bool overwrite = false;
   JsonOutput json;
@@ -55,6 +55,7 @@ struct TuneFlags {
 
 /// Margins and passivity of a loop with these gains.
 struct Tuned {
+  double rate_Hz;
   torsio::DeflectionController controller;
   torsio::JointFeedback feedback;
   torsio::Margins locked;
@@ -64,24 +65,30 @@ struct Tuned {
   double passive_Nm_rad = 0.0;  ///< stiffest impedance, passive up to `kContact_rad_s`
 };
 
+/// @throws torsio::UsageError if it is negative.
+double not_negative(const std::string& text, const char* unit, const char* flag) {
+  const double value = torsio::signed_quantity_with_unit(text, unit, flag);
+  if (value >= 0.0) return value;
+  throw torsio::UsageError({.place = flag, .expected = "0 or more", .found = text});
+}
+
 Tuned tuned(const TuneFlags& flags) {
   using torsio::JointOutput;
   torsio::DeflectionController::Settings settings{
       .joint = torsio::series_elastic_joint(torsio::find_data_sheet(flags.actuator)),
       .bandwidth_rad_s = angular_frequency_rad_s(flags.bandwidth, "--bandwidth"),
       .damping = above_zero(flags.damping, "--damping")};
-  if (!(flags.load_inertia_kg_m2 >= 0.0))
-    throw torsio::UsageError({.place = "--load-inertia",
-                              .expected = "0 or more",
-                              .found = fmt::format("{}", flags.load_inertia_kg_m2)});
-  settings.joint.joint_inertia_kg_m2 += flags.load_inertia_kg_m2;
+  settings.joint.joint_inertia_kg_m2 += not_negative(flags.load_inertia, "kg_m2", "--load-inertia");
   torsio::TorqueLoopCore::Settings loop{.deflection = settings};
   if (!flags.observer.empty())
     loop.observer_cutoff_Hz = above_zero(
         torsio::signed_quantity_with_unit(flags.observer, "Hz", "--observer"), "--observer");
-  const torsio::TorqueLoopCore core(loop, kRate_Hz);
+  const double rate_Hz =
+      above_zero(torsio::signed_quantity_with_unit(flags.rate, "Hz", "--rate"), "--rate");
+  const torsio::TorqueLoopCore core(loop, rate_Hz);
   const torsio::DeflectionController& controller = core.deflection();
-  return {.controller = controller,
+  return {.rate_Hz = rate_Hz,
+          .controller = controller,
           .feedback = core.feedback(),
           .locked = core.margins_of(JointOutput::locked),
           .free = core.margins_of(JointOutput::free),
@@ -95,8 +102,8 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.4g}", value) : std::string("none");
 }
 
-std::string passivity_text(const torsio::Passivity& passive) {
-  if (passive.passive_to_rad_s >= std::numbers::pi * kRate_Hz)
+std::string passivity_text(const torsio::Passivity& passive, double rate_Hz) {
+  if (passive.passive_to_rad_s >= std::numbers::pi * rate_Hz)
     return "passive at every frequency: stable in contact with any passive environment\n";
   const std::string below =
       passive.passive_to_rad_s > 0.0
@@ -137,10 +144,10 @@ std::string text_of(const TuneFlags& flags, const Tuned& loop) {
       "spring {:.4g} Nm/rad, drive {:.4g} kg m2 at the joint, {:.4g} Nm/A, derivative filtered at "
       "{:g} Hz\n{}\nstable for any gain between the least and the margin:\n{}\n{}"
       "an impedance on it{} is passive up to {:.3g} Hz with at most {} Nm/rad\n",
-      flags.actuator, kRate_Hz, settings.bandwidth_rad_s / kTurn, settings.damping,
+      flags.actuator, loop.rate_Hz, settings.bandwidth_rad_s / kTurn, settings.damping,
       loop.controller.cutoff_rad_s() / kTurn, joint.stiffness_Nm_rad, joint.drive.inertia(),
       joint.drive.torque_per_current(), settings.rate_cutoff_Hz, of_gains.text(), table.text(),
-      passivity_text(loop.passive), loop.observer_Hz ? ", without the observer," : "",
+      passivity_text(loop.passive, loop.rate_Hz), loop.observer_Hz ? ", without the observer," : "",
       kContact_rad_s / kTurn, number(loop.passive_Nm_rad));
 }
 
@@ -160,7 +167,7 @@ Json json_of(const TuneFlags& flags, const Tuned& loop) {
   const torsio::DeflectionController::Settings& settings = loop.controller.settings();
   const torsio::Pid::Gains& gains = loop.controller.gains();
   return {{"actuator", flags.actuator},
-          {"sample_rate_Hz", kRate_Hz},
+          {"sample_rate_Hz", loop.rate_Hz},
           {"bandwidth_Hz", settings.bandwidth_rad_s / kTurn},
           {"damping", settings.damping},
           {"cutoff_Hz", loop.controller.cutoff_rad_s() / kTurn},
@@ -191,13 +198,13 @@ torsio::ControllerFile controller_of(const TuneFlags& flags, const Tuned& loop) 
   const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
   torsio::ControllerFile file{
       .actuator = flags.actuator,
-      .sample_rate_Hz = kRate_Hz,
+      .sample_rate_Hz = loop.rate_Hz,
       .settings = {.torque = {.deflection = loop.controller.settings(),
                               .observer_cutoff_Hz = loop.observer_Hz},
                    .limits = {.speed_rad_s = torsio::speed_limit_of(sheet),
                               .max_unmeasured_load_Nm = kUnmeasuredShare * rated_Nm,
                               .max_measured_load_Nm = kMeasuredShare * rated_Nm}},
-      .stop = torsio::joint_stop_settings(sheet, flags.load_Nm)};
+      .stop = torsio::joint_stop_settings(sheet, not_negative(flags.load, "Nm", "--load"))};
   torsio::JointCascade::Limits& limits = file.settings.limits;
   if (!flags.lowest.empty())
     limits.lowest_rad = torsio::signed_quantity_with_unit(flags.lowest, "rad", "--lowest-angle");
@@ -266,8 +273,9 @@ void add_tune_loop(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--observer", flags->observer,
                    "add a disturbance observer with this cut-off: 8Hz");
-  verb->add_option("--load-inertia", flags->load_inertia_kg_m2,
-                   "inertia on the joint side, in kg m2, for the free output")
+  verb->add_option("--rate", flags->rate, "sample rate of the loop")->capture_default_str();
+  verb->add_option("--load-inertia", flags->load_inertia,
+                   "inertia on the joint side for the free output: 0.15kgm2")
       ->capture_default_str();
   verb->add_option(
       "-o,--output", flags->controller,
@@ -275,9 +283,8 @@ void add_tune_loop(CLI::App& app) {
   verb->add_option("--lowest-angle", flags->lowest,
                    "limit of the motion in that file, such as -90deg; default: none");
   verb->add_option("--highest-angle", flags->highest, "the same upwards");
-  verb->add_option(
-          "--load", flags->load_Nm,
-          "largest torque in Nm that pulls at the joint at rest, for the stop in that file")
+  verb->add_option("--load", flags->load,
+                   "largest torque that pulls at the joint at rest, for the stop in that file")
       ->capture_default_str();
   verb->add_flag("--overwrite", flags->overwrite, "replace the file if it exists");
   verb->add_option("--json", flags->json.destination,

@@ -58,7 +58,7 @@ void ConnectFlags::add_line(CLI::App& verb) {
       ->capture_default_str();
   verb.add_option("--unix", line.unix_path,
                   "socket of the joints in the file system; this program's is PATH.host");
-  verb.add_option("--serial", line.serial, "serial line, for example /dev/ttyUSB0");
+  verb.add_option("--serial-line", line.serial, "serial line, for example /dev/ttyUSB0");
   verb.add_option("--baud", line.baud, "rate of the serial line")->capture_default_str();
   verb.add_option("--id", id, "id of this program among the hosts")
       ->check(CLI::Range(1U, kHighestId))

@@ -56,7 +56,7 @@ void JointLineFlags::add(CLI::App& verb) {
       "ADDRESS[:PORT] of a host; no other is listened to; may be repeated. NDLCom has no "
       "authentication: an address can be forged");
   verb.add_option("--unix", unix_path, "PATH of a socket in place of UDP; the host's is PATH.host");
-  verb.add_option("--serial", serial, "serial line in place of UDP, as /dev/ttyUSB0");
+  verb.add_option("--serial-line", serial, "serial line in place of UDP, as /dev/ttyUSB0");
   verb.add_option("--pty", pty, "PATH of a link to a new pseudo-terminal in place of UDP");
   verb.add_option("--baud", baud, "rate of the serial line or pseudo-terminal")
       ->capture_default_str();
@@ -100,11 +100,11 @@ std::unique_ptr<torsio::LinkTransport> JointLineFlags::open(const CLI::App& verb
                     (pty.empty() ? 0 : 1);
   if (lines > 1)
     throw torsio::UsageError({.place = "torsio joint",
-                              .expected = "one line: UDP, --unix, --serial or --pty",
+                              .expected = "one line: UDP, --unix, --serial-line or --pty",
                               .found = fmt::format("options of {}", lines)});
   if (is_given("--baud") && serial.empty() && pty.empty())
     throw torsio::UsageError({.place = "--baud",
-                              .expected = "--serial or --pty, which have a rate",
+                              .expected = "--serial-line or --pty, which have a rate",
                               .found = "neither"});
   if (!unix_path.empty())
     return torsio::open_unix({.path = unix_path, .peer = unix_path + ".host"});

@@ -121,7 +121,7 @@ void add_adapt(CLI::App& app) {
       ->allow_extra_args(false);
   verb->add_option("-o,--output", flags->output,
                    "adapted model file; untouched unless all else succeeds");
-  verb->add_option("--serial", flags->device_serial,
+  verb->add_option("--device-serial", flags->device_serial,
                    "serial number of the joint that the adapted model belongs to");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");

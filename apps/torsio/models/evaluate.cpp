@@ -140,7 +140,7 @@ void add_evaluate(CLI::App& app) {
                        "load file: compare the estimate with the torque of this known load "
                        "(docs/use/known_load.md)");
   flags->data.add_initialise(*verb);
-  verb->add_option("--predictions", flags->predictions,
+  verb->add_option("-o,--output,--predictions", flags->predictions,
                    "write target, estimate, error bar and fault of one recording as CSV");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");

@@ -207,7 +207,7 @@ void add_fit(CLI::App& app) {
       "-o,--output", flags->output,
       "model file; untouched unless the fit succeeds; {joint} in its name: a model for each "
       "joint of the mapping");
-  verb->add_option("--serial", flags->device_serial,
+  verb->add_option("--device-serial", flags->device_serial,
                    "serial number of the joint that the model belongs to");
   add_seed(*verb, flags->seed, "seed of the random number generators");
   verb->add_flag("--allow-leak", flags->allow_leak,

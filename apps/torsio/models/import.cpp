@@ -143,7 +143,7 @@ void add_import(CLI::App& app) {
                    "YAML file that renames and converts the columns of these recordings");
   verb->add_option("-o,--output", flags->output,
                    "model file; untouched unless the import succeeds");
-  verb->add_option("--serial", flags->device_serial,
+  verb->add_option("--device-serial", flags->device_serial,
                    "serial number of the joint that the model belongs to");
   verb->add_option("--json", flags->json.destination,
                    "write the model's description as JSON to a file, or - for standard output");

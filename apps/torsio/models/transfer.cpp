@@ -145,7 +145,7 @@ void add_transfer(CLI::App& app) {
       ->delimiter(',');
   verb->add_option("-o,--output", flags->output,
                    "model file of the new joint; untouched unless all else succeeds");
-  verb->add_option("--serial", flags->device_serial, "serial number of the new joint");
+  verb->add_option("--device-serial", flags->device_serial, "serial number of the new joint");
   add_seed(*verb, flags->seed, "of the fit to the new data alone");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");

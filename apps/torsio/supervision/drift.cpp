@@ -114,7 +114,7 @@ void add_drift(CLI::App& app) {
   verb->add_option("--actuators", flags->settings.actuators,
                    "of the campaign, separated by commas (default: the series-elastic ones)")
       ->delimiter(',');
-  verb->add_option("--family", flags->settings.family, "of the models of the campaign")
+  verb->add_option("--model", flags->settings.family, "family of the models of the campaign")
       ->capture_default_str();
   verb->add_option(
       "--resume", flags->settings.resume,

@@ -18,8 +18,8 @@ namespace {
 constexpr auto kImpedanceLoop = "impedance";
 constexpr double kRadPerTurn = 2.0 * std::numbers::pi;
 constexpr double kSpeedCutoff_Hz = 40.0;  // as that of `TubeImpedance`
-constexpr double kStiffBandwidth_rad_s =
-    100.0;  // of a joint with an elastomer, whose spring is fast
+/// An elastomer is a fast spring.
+constexpr double kElastomerBandwidth_rad_s = 100.0;
 
 DeflectionController deflection_of(const ImpedancePlan::Spring& spring) {
   return {spring.torque.deflection, kBenchRate_Hz};
@@ -99,7 +99,7 @@ ImpedancePlan::Spring spring_settings(const DataSheet& sheet, const ImpedanceSpe
                       .advice = "The gains of this actuator's loop follow from its bandwidth."});
   const double bandwidth_rad_s =
       spec.bandwidth_rad_s.value_or(sheet.family == ActuatorFamily::elastomer
-                                        ? kStiffBandwidth_rad_s
+                                        ? kElastomerBandwidth_rad_s
                                         : TorqueLoopCore::Settings{}.deflection.bandwidth_rad_s);
   const bool is_zero = spec.kind == ImpedanceSpec::Kind::zero;
   return {.gains = {.stiffness_Nm_rad = is_zero ? 0.0 : spec.stiffness_Nm_rad,
