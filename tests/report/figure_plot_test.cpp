@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "report/plot/angles.hpp"
 #include "report/plot/label_places.hpp"
 #include "support/error_message.hpp"
 
@@ -89,6 +90,31 @@ TEST(FigurePlot, HasTheTextsOfTheAxesAndNoNumberThatIsNotFinite) {
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
   EXPECT_THAT(svg, Not(HasSubstr("hidden model")));
+}
+
+TEST(FigurePlot, HasAnglesInDegrees) {
+  const XyFigure loop{.title = "loop",
+                      .x = {"gear_angle_rad - joint_angle_rad [rad]"},
+                      .y = {"torque over spring_Nm_rad [Nm]"},
+                      .series = {{.label = "a", .x = {-M_PI, M_PI}, .y = {-M_PI, M_PI}}}};
+  TimeFigure time{.title = "time", .rate_Hz = 1.0, .samples = 2};
+  time.panels.push_back(
+      {.label = "[rad/s]",
+       .series = {{.label = "joint_speed_rad_s", .overview = {0.0F, 1.0F}, .detail = {}}}});
+  const ReportFigure figures[] = {loop, time};
+  const auto* const turned = std::get_if<XyFigure>(&figures[0]);
+  const ReportFigure in_deg = in_degrees(figures[0]);
+  const auto& converted = std::get<XyFigure>(in_deg);
+  EXPECT_EQ(converted.x.label, "gear_angle_deg - joint_angle_deg [deg]");
+  EXPECT_EQ(converted.y.label, turned->y.label) << "a stiffness stays";
+  EXPECT_NEAR(converted.series[0].x[1], 180.0, 1e-9);
+  EXPECT_EQ(converted.series[0].y[1], M_PI);
+  const ReportFigure time_in_deg = in_degrees(figures[1]);
+  const auto& panel = std::get<TimeFigure>(time_in_deg).panels.front();
+  EXPECT_EQ(panel.label, "[deg/s]");
+  EXPECT_EQ(panel.series.front().label, "joint_speed_deg_s");
+  EXPECT_NEAR(panel.series.front().overview[1], 57.29578F, 1e-4F);
+  EXPECT_THAT(figure_plot({&figures[0]}, PlotFormat::svg), HasSubstr("joint_angle_deg [deg]"));
 }
 
 TEST(FigurePlot, DrawsAPeakOfOneSample) {

@@ -14,6 +14,7 @@
 #include "core/lower.hpp"
 #include "data/names.hpp"
 #include "report/markup_text.hpp"
+#include "report/plot/angles.hpp"
 #include "report/plot/figure_painter.hpp"
 #include "torsio/core/error.hpp"
 
@@ -196,10 +197,16 @@ std::string figure_plot(const std::vector<const ReportFigure*>& figures, PlotFor
     throw UsageError({.place = "figure_plot",
                       .expected = "at least one figure and one column",
                       .found = fmt::format("{} and {}", figures.size(), size.columns)});
+  std::vector<ReportFigure> in_deg;
+  in_deg.reserve(figures.size());
+  for (const ReportFigure* figure : figures) in_deg.push_back(in_degrees(*figure));
+  std::vector<const ReportFigure*> shown;
+  shown.reserve(in_deg.size());
+  for (const ReportFigure& figure : in_deg) shown.push_back(&figure);
   std::string bytes;
   double detail = 1.0;
   for (int attempt = 0; attempt < 8; ++attempt) {
-    bytes = drawn(figures, format, size, detail);
+    bytes = drawn(shown, format, size, detail);
     if (bytes.size() <= kMaxPlotBytes) return bytes;
     detail *= 0.7;
   }
