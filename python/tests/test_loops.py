@@ -36,7 +36,7 @@ def test_a_loop_on_the_velocity_with_a_free_output_is_that_of_the_program(tmp_pa
         acts_on="velocity", velocity_bandwidth_rad_s=150.0, bandwidth_rad_s=30.0,
     )  # fmt: skip
     theirs = document(
-        tmp_path, "track", "--actuator", "dfki-50", "--reference", "steps", "--duration", "4s", "--output", "free",
+        tmp_path, "track", "--actuator", "dfki-50", "--reference", "steps", "--duration", "4s", "--joint-output", "free",
         "--lever", "0.5m", "--amplitude", "4Nm", "--acts-on", "velocity", "--velocity-bandwidth", "150rad_s",
         "--bandwidth", "30rad_s",
     )  # fmt: skip
