@@ -42,7 +42,9 @@ std::string task(const ImpedanceRun& run) {
 std::string passivity_text(const ImpedanceRun& run) {
   const std::string range =
       run.passive_to_Hz > 0.0 ? fmt::format("passive up to {:.4g} Hz", run.passive_to_Hz)
-                              : std::string("unstable: the dry friction of the gear stabilises it");
+                              : std::string(run.tube ? "unstable: the dry friction of the gear "
+                                                       "stabilises it"
+                                                     : "stable, but not passive at any frequency");
   const std::string limit =
       run.largest_passive_Nm_rad > 0.0
           ? fmt::format("at most {:.4g} Nm/rad are", run.largest_passive_Nm_rad)

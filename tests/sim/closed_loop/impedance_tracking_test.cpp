@@ -171,6 +171,15 @@ INSTANTIATE_TEST_SUITE_P(All, EveryActuator,
                            return name;
                          });
 
+// Without damping the integral of the torque loop is not passive, but the loop is stable.
+TEST(ImpedanceTracking, StatesThatAStableLoopIsNotPassive) {
+  const ImpedanceRun run = track_impedance(
+      data_sheet("dfki-50"),
+      {.kind = ImpedanceSpec::Kind::wanted, .stiffness_Nm_rad = 80.0, .duration_s = 10.0}, 1);
+  ASSERT_EQ(run.passive_to_Hz, 0.0);
+  EXPECT_NE(impedance_text(run).find("stable, but not passive"), std::string::npos);
+}
+
 // What an error proposes is what it accepts.
 TEST(ImpedanceTracking, ProposesStableGains) {
   for (const char* actuator :
