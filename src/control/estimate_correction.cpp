@@ -20,6 +20,7 @@ EstimateCorrection::EstimateCorrection(const Settings& settings, double sample_r
     : gain_(settings.bandwidth_rad_s / sample_rate_Hz),
       max_Nm_(settings.torque_Nm),
       fault_keep_(std::exp(-1.0 / (settings.fault_decay_s * sample_rate_Hz))) {
+  require_positive(kPlace, "sample_rate_Hz", sample_rate_Hz);
   require_positive(kPlace, "bandwidth_rad_s", settings.bandwidth_rad_s);
   require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
   require<Error>(settings.torque_Nm > 0.0, fmt::format("{} torque_Nm", kPlace), "above 0 Nm",

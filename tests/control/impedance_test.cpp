@@ -357,6 +357,10 @@ TEST(EstimateCorrection, RefusesWhatIsImpossible) {
   EXPECT_NE(refusal({.bandwidth_rad_s = kNaN}), "");
   EXPECT_NE(refusal({.torque_Nm = 0.0}), "");
   EXPECT_NE(refusal({.fault_decay_s = -1.0}), "");
+  for (const double rate_Hz : {-kRate_Hz, 0.0, kNaN}) {
+    const std::string refused = test::error_message([&] { EstimateCorrection({}, rate_Hz); });
+    EXPECT_NE(refused.find("sample_rate_Hz"), std::string::npos) << refused;
+  }
 }
 
 TEST(TubeImpedance, RefusesWhatItCannotRender) {

@@ -13,9 +13,10 @@ namespace torsio {
 ///
 ///     c[n+1] = c[n] + ω T (τ*[n] − τ̂[n]),   |c| <= τ_max
 ///
-/// τ* is the wanted torque and τ̂ the estimate; the controller is given τ* + c. Below ω the torque
-/// follows the model, above it the controller's own spring. For a model that has no inverse; one
-/// that has is better as the inverse of a `TorqueController`. Ours.
+/// τ* is the wanted torque and τ̂ the estimate, in Nm at the joint, and T the period [s]; the
+/// controller is given τ* + c. Below ω the torque follows the model, above it the controller's own
+/// spring. For a model that has no inverse; one that has is better as the inverse of a
+/// `TorqueController`. Ours.
 class EstimateCorrection {
  public:
   struct Settings {
@@ -24,7 +25,8 @@ class EstimateCorrection {
     double fault_decay_s = 0.1;  ///< decay of c while the estimate has a fault
   };
 
-  /// @throws Error if a setting is not positive, or the bandwidth above a tenth of the sample rate.
+  /// @throws Error if a setting or the sample rate is not positive, or the bandwidth [rad/s] above a
+  /// tenth of the sample rate [Hz].
   EstimateCorrection(const Settings& settings, double sample_rate_Hz);
 
   void reset() noexcept { correction_Nm_ = 0.0; }
@@ -42,9 +44,13 @@ class EstimateCorrection {
   double correction_Nm_ = 0.0;
 };
 
-/// The feedback of a loop with the correction, the estimate being K δ. Allocates.
-/// @param impedance from the joint's angle to −τ*
-/// @param torque_path from the torque reference to the current
+/// The feedback of a loop with the correction, the estimate being K δ:
+///
+///     C_δ + G ω T / (z − 1) K,   C_q + G ω T / (z − 1) Z
+///
+/// Allocates. @throws Error if the systems have different sample rates.
+/// @param impedance Z, from the joint's angle [rad] to −τ* [Nm]
+/// @param torque_path G, from the torque reference [Nm] to the current [A]
 [[nodiscard]] JointFeedback corrected_feedback(const JointFeedback& loop,
                                                const LinearSystem& impedance,
                                                const LinearSystem& torque_path,
