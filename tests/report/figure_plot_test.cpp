@@ -182,6 +182,19 @@ TEST(FigurePlot, FillsTheAreasOfAFieldByTheirValues) {
   EXPECT_EQ(count("rgb(90%,15%,10%)"), 2U);
 }
 
+TEST(FigurePlot, FillsAFieldOfZerosByTheLowestShade) {
+  const ReportFigure zeros =
+      FieldFigure{.title = "strain",
+                  .value_label = "%",
+                  .highest = 0.0,
+                  .areas = {{.corners = {{0.0, 0.0}, {1.0, 0.0}, {1.0, 1.0}}, .value = 0.0}}};
+  const std::string svg = figure_plot({&zeros}, PlotFormat::svg);
+  const std::string lowest = "rgb(10%,15%,90%)";
+  const std::size_t scale = svg.find(lowest);
+  ASSERT_NE(scale, std::string::npos);
+  EXPECT_NE(svg.find(lowest, scale + 1), std::string::npos) << "the area beside the scale";
+}
+
 TEST(FigurePlot, AcceptsTextThatIsNotUtf8) {
   const ReportFigure figure =
       XyFigure{.title = "\xff\xfe file", .x = {"x"}, .y = {"y"}, .series = {}};
@@ -260,6 +273,18 @@ TEST(FigurePlot, WritesTheNamesOfColumnsAndOfValues) {
   for (const char* text : {"first input", "second input", "none", "diverged"})
     EXPECT_THAT(svg, HasSubstr(text));
   EXPECT_THAT(svg, Not(HasSubstr("warming_up"))) << "it does not occur";
+}
+
+TEST(FigurePlot, DrawsAPanelOfStatesWithoutANumber) {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  TimeFigure time{.title = "t", .rate_Hz = 10.0, .samples = 2};
+  time.panels.push_back({.label = "fault_1",
+                         .series = {{.label = "a", .overview = {kNaN, kNaN}, .detail = {}}},
+                         .value_names = {"none", "diverged"}});
+  const ReportFigure figure = time;
+  const std::string svg = figure_plot({&figure}, PlotFormat::svg);
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(svg, Not(HasSubstr("inf")));
 }
 
 bool do_boxes_overlap(const PlotArea& a, const PlotArea& b) {

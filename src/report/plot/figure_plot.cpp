@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <exception>
 #include <memory>
 #include <numeric>
 
@@ -29,8 +30,13 @@ constexpr double kHead_mm = 16.0;
 using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
 using Cairo = std::unique_ptr<cairo_t, decltype(&cairo_destroy)>;
 
-cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count) {
-  static_cast<std::string*>(text)->append(bytes, bytes + count);
+/// Called by cairo, through whose frames no exception may pass.
+cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count) noexcept {
+  try {
+    static_cast<std::string*>(text)->append(bytes, bytes + count);
+  } catch (const std::exception&) {
+    return CAIRO_STATUS_WRITE_ERROR;
+  }
   return CAIRO_STATUS_SUCCESS;
 }
 

@@ -11,9 +11,10 @@ namespace {
 
 constexpr std::size_t kShades = 32;
 
-/// The shade of a value, `kShades` for one that is not finite.
+/// The shade of a value, `kShades` for one that is not finite; the lowest for all where none is above 0.
 std::size_t shade_of(const FieldFigure& figure, double value) {
   if (!std::isfinite(value)) return kShades;
+  if (!(figure.highest > 0.0)) return 0;
   const double share = std::clamp(value / figure.highest, 0.0, 1.0);
   return std::min(static_cast<std::size_t>(share * kShades), kShades - 1);
 }

@@ -71,7 +71,7 @@ void FigurePainter::panel(const TimeFigure& figure, const TimeFigure::Panel& pan
     for (const double value : values.back())
       if (std::isfinite(value)) range.include(value);
   }
-  if (!panel.value_names.empty()) {
+  if (!panel.value_names.empty() && !range.is_empty()) {
     const double margin = 0.35 * std::max(range.highest - range.lowest, 1.0);
     range.include(range.lowest - margin);
     range.include(range.highest + margin);
