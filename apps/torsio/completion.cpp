@@ -46,7 +46,6 @@ std::vector<std::string> part_names(const CLI::App& verb) {
   return names;
 }
 
-/// The names that an argument can have, which the shell offers besides files; empty: only files.
 std::string actuator_words() {
   std::vector<std::string> words;
   for (const torsio::DataSheet& sheet : torsio::data_sheets()) {
@@ -75,7 +74,7 @@ std::string study_words() {
   return fmt::format("{}", fmt::join(names, " "));
 }
 
-/// An argument of a verb whose values have names.
+/// An argument of a verb whose values have names, which the shell offers besides files.
 struct NamedValues {
   std::string verb;
   std::string argument;  ///< an option with its dashes, or the place of a positional: "1"
@@ -106,14 +105,19 @@ std::vector<NamedValues> named_values(const CLI::App& app) {
   return all;
 }
 
+/// The pattern, for bash and zsh, of "VERB BEFORE PLACE": a verb, the word before the one that is completed, and its
+/// place. What follows an option is its value, not a positional.
+std::string pattern_of(const NamedValues& values) {
+  return values.argument.starts_with("-")
+             ? fmt::format("'{} {} '*", values.verb, values.argument)
+             : fmt::format("'{} '[!-]*' {}'", values.verb, values.argument);
+}
+
 /// The values after an option and in the places of positionals.
 std::string bash_values(const CLI::App& app) {
   std::string cases;
   for (const NamedValues& each : named_values(app))
-    cases += each.argument.starts_with("-") ? fmt::format("    '{} {} '*) values='{}' ;;\n",
-                                                          each.verb, each.argument, each.words)
-                                            : fmt::format("    '{} '*' {}') values='{}' ;;\n",
-                                                          each.verb, each.argument, each.words);
+    cases += fmt::format("    {}) values='{}' ;;\n", pattern_of(each), each.words);
   return cases;
 }
 
@@ -126,7 +130,7 @@ std::string bash_words(const CLI::App& verb) {
   for (const CLI::App* part : verbs_of(verb))
     cases += fmt::format("      {}) words='{}' ;;\n", part->get_name(),
                          fmt::join(option_names(*part), " "));
-  return fmt::format("parts='{}'; case ${{COMP_WORDS[2]}} in\n{}      *) {} ;;\n    esac",
+  return fmt::format("parts='{}'; case ${{typed[2]}} in\n{}      *) {} ;;\n    esac",
                      fmt::join(parts, " "), cases, own);
 }
 
@@ -137,16 +141,29 @@ std::string bash_script(const CLI::App& app) {
     verbs += verb->get_name() + " ";
     cases += fmt::format("    {}) {} ;;\n", verb->get_name(), bash_words(*verb));
   }
+  // Bash divides what is typed at : and =, and replaces only the part after them: dfki-28:lugre is three words there.
   return fmt::format(
       "_torsio() {{\n"
-      "  local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}}\n"
-      "  local words parts values place=$((COMP_CWORD - 1))\n"
-      "  case ${{COMP_WORDS[1]}} in\n{}  esac\n"
-      "  case \"${{COMP_WORDS[1]}} $before $place\" in\n{}  esac\n"
-      "  if ((COMP_CWORD == 1)); then words='{}{}'\n"
-      "  elif ((COMP_CWORD == 2)) && [[ $parts && $current != -* ]]; then words=$parts\n"
+      "  local words parts values typed=() word is_joined= has_value=\n"
+      "  for word in \"${{COMP_WORDS[@]:0:COMP_CWORD+1}}\"; do\n"
+      "    if [[ $word == '=' ]]; then has_value=1; continue; fi\n"
+      "    if [[ $word == ':' || $is_joined ]]; then typed[${{#typed[@]}}-1]+=$word\n"
+      "    else typed+=(\"$word\"); fi\n"
+      "    is_joined= has_value=\n"
+      "    if [[ $word == ':' ]]; then is_joined=1; fi\n"
+      "  done\n"
+      "  if [[ $has_value ]]; then typed+=(''); fi\n"
+      "  local place=$((${{#typed[@]}} - 2))\n"
+      "  local current=${{typed[place+1]}} before=${{typed[place]}} fixed=\n"
+      "  if [[ $is_joined ]]; then fixed=$current\n"
+      "  elif [[ ! $has_value ]]; then fixed=${{current%\"${{COMP_WORDS[COMP_CWORD]}}\"}}; fi\n"
+      "  case ${{typed[1]}} in\n{}  esac\n"
+      "  case \"${{typed[1]}} $before $place\" in\n{}  esac\n"
+      "  if ((place == 0)); then words='{}{}'\n"
+      "  elif ((place == 1)) && [[ $parts && $current != -* ]]; then words=$parts\n"
       "  elif [[ $current != -* ]]; then words=$values; fi\n"
       "  COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
+      "  if [[ $fixed ]]; then COMPREPLY=(\"${{COMPREPLY[@]#\"$fixed\"}}\"); fi\n"
       "}}\n"
       "complete -o default -F _torsio torsio\n",
       cases, bash_values(app), verbs, fmt::join(option_names(app), " "));
@@ -167,10 +184,7 @@ std::string zsh_words(const CLI::App& verb) {
 std::string zsh_values(const CLI::App& app) {
   std::string cases;
   for (const NamedValues& each : named_values(app))
-    cases += each.argument.starts_with("-") ? fmt::format("      '{} {} '*) compadd -- {} ;;\n",
-                                                          each.verb, each.argument, each.words)
-                                            : fmt::format("      '{} '*' {}') compadd -- {} ;;\n",
-                                                          each.verb, each.argument, each.words);
+    cases += fmt::format("      {}) compadd -- {} ;;\n", pattern_of(each), each.words);
   return cases;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 
 #include "program.hpp"
@@ -176,6 +177,14 @@ TEST_F(FirstMinute, CompletionKnowsTheVerbsAndTheirOptions) {
   EXPECT_EQ(complete("reproduce 001-mod", 2), "001-models\n");
   EXPECT_EQ(complete("design spr", 2), "spring\n");
   EXPECT_EQ(complete("fit a.c", 2), "\n") << "the shell completes files";
+  // As bash divides it: at : and =.
+  EXPECT_EQ(complete("simulate dfki-28 :", 3), "maxwell-slip bouc-wen lugre\n");
+  EXPECT_EQ(complete("simulate dfki-28 : lu", 4), "lugre\n");
+  EXPECT_EQ(complete("simulate dfki-28 : lugre static", 5), "static-cycle\n");
+  EXPECT_EQ(complete("fit a.csv --model = grey", 5), "grey_box\n");
+  EXPECT_EQ(complete("fit a.csv --model =", 4), complete("fit a.csv --model ''", 4));
+  EXPECT_EQ(complete("simulate --describe dfki-28:lu", 3), "dfki-28:lugre\n");
+  EXPECT_EQ(complete("simulate -o static", 3), "\n") << "a file, not an experiment";
   for (const char* shell_name : {"bash", "zsh", "fish"}) {
     const Outcome script = torsio(std::string("completion ") + shell_name);
     for (const char* word :
@@ -183,6 +192,17 @@ TEST_F(FirstMinute, CompletionKnowsTheVerbsAndTheirOptions) {
       EXPECT_NE(script.out.find(word), std::string::npos) << shell_name << " " << word;
   }
   EXPECT_EQ(torsio("completion tcsh").exit_code, kCallWasWrong);
+}
+
+TEST_F(FirstMinute, CompletionOffersValuesOnlyOfOptionsThatExist) {
+  const std::string script = torsio("completion bash").out;
+  const std::regex case_of_option("'([a-z]+) (--[a-z-]+) '\\*\\)");
+  std::size_t options = 0;
+  for (std::sregex_iterator at(script.begin(), script.end(), case_of_option), end; at != end;
+       ++at, ++options)
+    EXPECT_NE(torsio((*at)[1].str() + " --help").out.find((*at)[2].str()), std::string::npos)
+        << at->str();
+  EXPECT_GT(options, 8U);
 }
 
 }  // namespace
