@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "core/checks.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/report/tracking.hpp"
@@ -51,7 +52,7 @@ TorqueReference reference_of(const TrackCall& call) {
     if (!std::isfinite(reference.recorded_Nm[n]))
       throw UsageError({.place = "recorded: torque_Nm in sample " + std::to_string(n),
                         .expected = "a number: a replayed reference has no gaps",
-                        .found = std::to_string(reference.recorded_Nm[n])});
+                        .found = as_text(reference.recorded_Nm[n])});
   return reference;
 }
 
@@ -71,7 +72,7 @@ void check_call(const TrackCall& call) {
   if (!(call.friction_share >= 0.0 && call.friction_share <= 1.0))
     throw UsageError({.place = "friction",
                       .expected = "a share from 0 to 1",
-                      .found = std::to_string(call.friction_share)});
+                      .found = as_text(call.friction_share)});
 }
 
 std::optional<DriveLimits> limits_of(const TrackCall& call) {
@@ -81,7 +82,7 @@ std::optional<DriveLimits> limits_of(const TrackCall& call) {
   if (call.highest_rad) limits.highest_rad = *call.highest_rad;
   if (call.speed_rad_s) limits.speed_rad_s = *call.speed_rad_s;
   const auto refuse = [](const char* place, const char* expected, double found) {
-    throw UsageError({.place = place, .expected = expected, .found = std::to_string(found)});
+    throw UsageError({.place = place, .expected = expected, .found = as_text(found)});
   };
   if (!(limits.lowest_rad < 0.0))
     refuse("lowest_rad", "below 0, where the run starts", limits.lowest_rad);

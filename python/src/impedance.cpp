@@ -20,7 +20,10 @@ void set_impedance(ImpedanceSpec& spec, const py::object& impedance) {
     spec.kind = name == "high" ? ImpedanceSpec::Kind::high : ImpedanceSpec::Kind::zero;
     return;
   }
-  if (!py::isinstance<py::float_>(impedance) && !py::isinstance<py::int_>(impedance))
+  const bool is_number =
+      (py::isinstance<py::float_>(impedance) || py::isinstance<py::int_>(impedance)) &&
+      !py::isinstance<py::bool_>(impedance);  // a bool is an int of Python
+  if (!is_number)
     throw UsageError({.place = "impedance",
                       .expected = "'high', 'zero' or a stiffness in Nm/rad",
                       .found = kind_of(impedance)});

@@ -40,6 +40,7 @@ def test_a_stiffness_that_is_too_large_and_wrong_calls_are_refused():
         ({"impedance": 1e6}, "passive"),
         ({"impedance": "soft"}, "stiffness"),
         ({"impedance": None}, "stiffness"),
+        ({"impedance": True}, "stiffness"),
         ({"impedance": "zero", "damping_Nms_rad": 1.0}, "damping_Nms_rad"),
         ({"impedance": 100.0, "duration_s": 1.0}, "duration"),
     ]:

@@ -76,6 +76,7 @@ def test_what_has_no_effect_or_contradicts_itself_is_refused(sweep):
         ({"acts_on": "torque"}, "current"),
         ({"lowest_rad": 0.1}, "lowest_rad"),
         ({"speed_rad_s": 0.0}, "speed_rad_s"),
+        ({"speed_rad_s": -1e-9}, "found -1e-09"),
         ({"friction": 2.0}, "0 to 1"),
         ({"recorded": sweep}, "replay"),
         ({"reference": "replay"}, "replay"),

@@ -90,6 +90,20 @@ def test_a_report_has_tables(bench, faulty):
     assert report.torques[0]["monitor_state_1"].max() == 3.0
 
 
+def test_one_name_is_not_a_list_of_letters(bench):
+    folder, _ = bench
+    sources = {
+        "spring": torsio.MonitorSource(folder / "spring.safetensors", "gear_encoder"),
+        "current": torsio.MonitorSource(folder / "current.safetensors", "current_sensor"),
+    }
+    torsio.calibrate_monitor(
+        folder / "one.monitor.json", [folder / "b.csv", folder / "c.csv"], sources, signals="gear_angle_rad",
+        false_alarms_per_hour=200.0,
+    )  # fmt: skip
+    written = json.loads((folder / "one.monitor.json").read_text())
+    assert "gear_encoder" in json.dumps(written) and '"g"' not in json.dumps(written)
+
+
 def test_what_does_not_belong_together_is_refused(bench, faulty):
     folder, _ = bench
     monitor = folder / "j.monitor.json"

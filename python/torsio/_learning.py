@@ -31,10 +31,11 @@ def _dataset(
     return Dataset(test=data, target=target, load=load, fitted_by=fitted_by)
 
 
-def _inputs(inputs: str | Sequence[str] | None) -> list[str]:
-    if inputs is None:
+def _names(names: str | Sequence[str] | None) -> list[str]:
+    """One name or several: a str is a sequence, of letters."""
+    if names is None:
         return []
-    return [inputs] if isinstance(inputs, str) else list(inputs)
+    return [names] if isinstance(names, str) else list(names)
 
 
 def _option(value: Any) -> str:
@@ -53,7 +54,7 @@ def check(
     advise: also propose which recording to make next, in `report.document["advice"]`.
     load: the target is the torque of this known load (docs/use/known_load.md).
     """
-    return CheckReport.from_json(_core.check(_dataset(data, "train", load=load), _inputs(inputs), advise))
+    return CheckReport.from_json(_core.check(_dataset(data, "train", load=load), _names(inputs), advise))
 
 
 def fit(
@@ -80,7 +81,7 @@ def fit(
     given = {name: _option(value) for name, value in options.items()}
     with shown(progress):
         dataset = _dataset(data, "train", load=load)
-        return _core.fit(dataset, family, given, _inputs(inputs), seed, allow_leak, serial)
+        return _core.fit(dataset, family, given, _names(inputs), seed, allow_leak, serial)
 
 
 def evaluate(
@@ -111,7 +112,7 @@ def compare(
     """
     names = models if isinstance(models, str) else ",".join(models)
     with shown(progress):
-        text, best = _core.compare(_dataset(data, "train"), names, _inputs(inputs), seed, allow_leak)
+        text, best = _core.compare(_dataset(data, "train"), names, _names(inputs), seed, allow_leak)
     return Comparison(Results.from_json(text), best)
 
 
@@ -135,7 +136,7 @@ def crossvalidate(
     names = models if isinstance(models, str) else ",".join(models)
     with shown(progress):
         text = _core.crossvalidate(
-            _dataset(data, "train"), names, _inputs(inputs), folds, by, embargo_s, seed, allow_leak
+            _dataset(data, "train"), names, _names(inputs), folds, by, embargo_s, seed, allow_leak
         )
     return CrossValidation.from_json(text)
 
@@ -205,7 +206,7 @@ def import_network(
     dataset = None if guards is None else _dataset(guards, "train", target)
     return _core.import_network(
         path,
-        _inputs(inputs),
+        _names(inputs),
         rate_Hz,
         target,
         list(input_scale),

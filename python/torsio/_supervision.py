@@ -12,7 +12,7 @@ from . import _core
 from ._core import Dataset, Model, Recording
 from ._drives import Recordings
 from ._loops import Faults, split_faults
-from ._learning import Data, _option
+from ._learning import Data, _names, _option
 from ._progress import Listener, shown
 from ._results import Document, _data_frame, _document, _number, _table_html, _table_text
 
@@ -48,7 +48,10 @@ class MonitorReport:
 
     def _cells(self) -> tuple[list[str], list[list[Any]], str]:
         columns = ["recording", "watching_from_s", "stopped_at_s"]
-        rows = [[_shown(each[column]) for column in columns] for each in self.document["recordings"]]
+        rows = [
+            [each["recording"], _number(each["watching_from_s"]), _number(each["stopped_at_s"])]
+            for each in self.document["recordings"]
+        ]
         return columns, rows, "monitor"
 
     def __repr__(self) -> str:
@@ -56,10 +59,6 @@ class MonitorReport:
 
     def _repr_html_(self) -> str:
         return _table_html(*self._cells())
-
-
-def _shown(value: Any) -> Any:
-    return math.nan if value is None else value
 
 
 def monitor(
@@ -88,7 +87,7 @@ class MonitorSource:
     """A source of the torque for `calibrate_monitor`."""
 
     model: str | PathLike[str]  #: model file that estimates the torque
-    depends_on: Sequence[str] = ()  #: parts whose fault changes it, such as "gear_encoder"
+    depends_on: str | Sequence[str] = ()  #: parts whose fault changes it, such as "gear_encoder"
     friction: str | PathLike[str] | None = None  #: model file of the drive's friction, which is added
 
 
@@ -97,7 +96,7 @@ def calibrate_monitor(
     recordings: Recordings,
     sources: Mapping[str, MonitorSource],
     *,
-    signals: Sequence[str] = (),
+    signals: str | Sequence[str] = (),
     serial: str = "",
     valid_until: str = "",
     false_alarms_per_hour: float = 1.0,
@@ -120,13 +119,13 @@ def calibrate_monitor(
     mapping, rate_Hz: for paths; without them as the models were trained.
     Returns the limits of each pair. Errors: Error for recordings that lack a channel or are too short.
     """
-    rows = [(name, each.model, each.friction, list(each.depends_on)) for name, each in sources.items()]
+    rows = [(name, each.model, each.friction, _names(each.depends_on)) for name, each in sources.items()]
     with shown(progress):
         text = _core.calibrate_monitor(
             path,
             recordings,
             rows,
-            list(signals),
+            _names(signals),
             serial,
             valid_until,
             false_alarms_per_hour,
