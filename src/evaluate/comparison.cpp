@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "evaluate/common_samples.hpp"
+#include "evaluate/constant_offset.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "evaluate/left_ranges.hpp"
 #include "evaluate/model_label.hpp"
@@ -173,15 +174,19 @@ std::vector<std::string> warnings_of(const std::vector<ScoredModel>& models) {
 
 }  // namespace
 
-Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
-                   std::uint64_t seed, bool allow_leak, const Progress& progress) {
-  dataset.check();
-  refuse_seen_test_records(dataset);
+void require_test_recordings(const Dataset& dataset) {
   if (!dataset.has_role(Role::test))
     throw UsageError(
         {.problem = "nothing to compare on: no recording has the role test",
          .advice =
              "Name held-out recordings with --test, or give them `role: test` in a manifest."});
+}
+
+Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
+                   std::uint64_t seed, bool allow_leak, const Progress& progress) {
+  dataset.check();
+  refuse_seen_test_records(dataset);
+  require_test_recordings(dataset);
   Comparison comparison{.results = empty_results(dataset), .models = {}, .best = {}};
   Results& results = comparison.results;
   InputSets input_sets(dataset, allow_leak);
@@ -207,30 +212,38 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
   return comparison;
 }
 
-Results evaluate_model(const ModelFile& file, const Dataset& dataset,
-                       const std::vector<ScoredRun>& runs) {
+namespace {
+
+Results results_of(const ModelFile& file, const Dataset& dataset, const Estimator& estimator,
+                   const std::vector<SplitScore>& scores) {
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
-  results.warnings =
-      left_range_warnings(make_estimator(file, dataset.sample_rate_Hz()).settings(), dataset);
-  for (const Role role : kRoles)
-    if (dataset.has_role(role))
-      std::ranges::move(rows_of(file, role, evaluate(runs, role)),
-                        std::back_inserter(results.rows));
+  for (std::size_t i = 0; i < kRoles.size(); ++i) {
+    if (!dataset.has_role(kRoles[i])) continue;
+    std::ranges::move(rows_of(file, kRoles[i], scores[i]), std::back_inserter(results.rows));
+    if (kRoles[i] != Role::train)
+      std::ranges::move(offset_warnings(estimator, dataset, kRoles[i], scores[i]),
+                        std::back_inserter(results.warnings));
+  }
+  std::ranges::move(left_range_warnings(estimator.settings(), dataset, !results.warnings.empty()),
+                    std::back_inserter(results.warnings));
   return results;
+}
+
+}  // namespace
+
+Results evaluate_model(const ModelFile& file, const Dataset& dataset,
+                       const std::vector<ScoredRun>& runs) {
+  std::vector<SplitScore> scores;
+  for (const Role role : kRoles)
+    scores.push_back(dataset.has_role(role) ? evaluate(runs, role) : SplitScore{});
+  return results_of(file, dataset, make_estimator(file, dataset.sample_rate_Hz()), scores);
 }
 
 Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Progress& progress) {
   dataset.check();
-  Results results = empty_results(dataset);
-  results.inputs = file.settings.features.inputs;
   const Estimator estimator = make_estimator(file, dataset.sample_rate_Hz());
-  results.warnings = left_range_warnings(estimator.settings(), dataset);
-  const std::vector<SplitScore> scores = evaluate(estimator, dataset, kRoles, progress);
-  for (std::size_t i = 0; i < kRoles.size(); ++i)
-    if (dataset.has_role(kRoles[i]))
-      std::ranges::move(rows_of(file, kRoles[i], scores[i]), std::back_inserter(results.rows));
-  return results;
+  return results_of(file, dataset, estimator, evaluate(estimator, dataset, kRoles, progress));
 }
 
 void mark_divergence_in_training(std::vector<ResultRow>& rows) {

@@ -71,7 +71,7 @@ std::string advice(const InputCourse& course, double lowest, double highest, boo
 }  // namespace
 
 std::vector<std::string> left_range_warnings(const EstimatorSettings& settings,
-                                             const Dataset& dataset) {
+                                             const Dataset& dataset, bool has_offset) {
   FeaturePipeline pipeline(settings.features, settings.sample_rate_Hz);
   const FeatureRanges& trained = settings.ranges;
   InputCourses courses{.inputs = std::vector<InputCourse>(pipeline.feature_count())};
@@ -89,7 +89,8 @@ std::vector<std::string> left_range_warnings(const EstimatorSettings& settings,
         "the samples, which a guard reports; {}",
         settings.features.inputs[j], course.lowest, course.highest, trained.lowest[j],
         trained.highest[j], 100.0 * share,
-        advice(course, trained.lowest[j], trained.highest[j], pipeline.is_rate(j))));
+        has_offset ? "remove the offset first, then evaluate again"
+                   : advice(course, trained.lowest[j], trained.highest[j], pipeline.is_rate(j))));
   }
   return warnings;
 }

@@ -172,6 +172,66 @@ TEST(EvaluateModel, SaysWhichInputLeavesTheTrainingByHowMuch) {
   EXPECT_EQ(evaluate_model(file, larger, runs).warnings, warnings);
 }
 
+/// A spring that becomes stiffer, with the zeros of an angle and of the torque moved.
+Recording stiffening(const std::string& name, std::uint64_t seed, double amplitude_rad,
+                     double cubic_Nm_rad3, double angle_rad = 0.0, double torque_Nm = 0.0) {
+  const Recording bench = test::bench_recording(
+      name, {.friction_Nm = 0.05, .amplitude_rad = amplitude_rad, .seed = seed});
+  const std::vector<double> gear = bench.channel("gear_angle_rad").values;
+  const std::vector<double> joint = bench.channel("joint_angle_rad").values;
+  return test::changed(bench, [&](Channel& channel) {
+    for (std::size_t i = 0; i < channel.values.size(); ++i) {
+      if (channel.name == "joint_angle_rad") channel.values[i] += angle_rad;
+      if (channel.name == "torque_Nm")
+        channel.values[i] += cubic_Nm_rad3 * std::pow(gear[i] - joint[i], 3) + torque_Nm;
+    }
+  });
+}
+
+/// The warnings of a model of that spring on a recording with such zeros.
+std::vector<std::string> zero_warnings(double cubic_Nm_rad3, double angle_rad, double torque_Nm) {
+  Dataset training;
+  test::add_record(training, stiffening("first", 1, 0.04, cubic_Nm_rad3), Role::train);
+  const ModelFile file = trained(training, "polynomial").file;
+  Dataset later;
+  test::add_record(later, stiffening("later", 3, 0.02, cubic_Nm_rad3, angle_rad, torque_Nm),
+                   Role::test);
+  const std::vector<std::string> warnings = evaluate_model(file, later).warnings;
+  const std::vector<ScoredRun> runs = scored_runs(make_estimator(file), later);
+  EXPECT_EQ(evaluate_model(file, later, runs).warnings, warnings);
+  return warnings;
+}
+
+TEST(EvaluateModel, NamesAZeroThatChanged) {
+  constexpr double kCubic = 1e5;
+  EXPECT_THAT(zero_warnings(kCubic, 0.0, 0.0), testing::IsEmpty());
+  const auto of_angle = zero_warnings(kCubic, 0.01, 0.0);
+  ASSERT_EQ(of_angle.size(), 1U);
+  EXPECT_THAT(of_angle[0], testing::HasSubstr("too low throughout"));
+  EXPECT_THAT(of_angle[0], testing::HasSubstr("was the zero of an encoder changed"));
+  EXPECT_THAT(of_angle[0], testing::HasSubstr("-0.00999 rad added to joint_angle_rad explain it "
+                                              "better than another zero of torque_Nm"));
+  EXPECT_THAT(of_angle[0], testing::HasSubstr("{channel: gear_angle_rad, first: 0.5s}"));
+  const auto of_torque = zero_warnings(kCubic, 0.0, -6.0);
+  ASSERT_EQ(of_torque.size(), 1U);
+  EXPECT_THAT(of_torque[0], testing::HasSubstr("6 Nm too high throughout"));
+  EXPECT_THAT(of_torque[0], testing::HasSubstr("a constant load on its sensor?"));
+  EXPECT_THAT(of_torque[0], testing::Not(testing::HasSubstr("encoder")));
+  const auto of_linear_spring = zero_warnings(0.0, 0.01, 0.0);
+  ASSERT_EQ(of_linear_spring.size(), 1U);
+  EXPECT_THAT(of_linear_spring[0], testing::HasSubstr("was the zero of an encoder changed"));
+  EXPECT_THAT(of_linear_spring[0], testing::HasSubstr("The data do not distinguish this"));
+}
+
+TEST(EvaluateModel, DoesNotCallAnotherStiffnessAnOffset) {
+  const ModelFile file = trained(test::bench_dataset(), "linear").file;
+  Dataset stiffer;
+  test::add_record(stiffer, test::bench_recording("stiffer", {.stiffness_Nm_rad = 800.0}),
+                   Role::test);
+  for (const std::string& warning : evaluate_model(file, stiffer).warnings)
+    EXPECT_THAT(warning, testing::Not(testing::HasSubstr("throughout")));
+}
+
 TEST(EvaluateModel, NamesNoFactorOfASpeedThatIsNearOne) {
   const Dataset dataset = test::bench_dataset();
   ModelFile file = trained(dataset, "linear_coulomb").file;
