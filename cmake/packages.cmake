@@ -56,7 +56,7 @@ if(TORSIO_BUILD_C)
   string(PREPEND CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libtorsio${abi} (= ${PROJECT_VERSION}), ")
 endif()
 # Of the components realtime, arm and lab, and of onnx, live and mujoco.
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS "zlib1g-dev, libzstd-dev, liblz4-dev, libbz2-dev, libsqlite3-dev, libyaml-cpp-dev, libssl-dev, libcairo2-dev, libexpat1-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS "zlib1g-dev, libzstd-dev, liblz4-dev, libbz2-dev, libsqlite3-dev, libpq-dev, libyaml-cpp-dev, libssl-dev, libcairo2-dev, libexpat1-dev")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS "libonnx-dev, libprotobuf-dev, libwebsockets-dev, libmujoco-dev")
 if(TORSIO_BUILD_PYTHON)
   torsio_debian_package(python python3-torsio python "The Python package torsio.")

@@ -84,6 +84,8 @@ int run(int argc, char** argv) {
   add_estimate(app);
   add_compare(app);
   add_crossvalidate(app);
+  add_search(app);
+  add_work(app);
   add_attribute(app);
   add_adapt(app);
   add_import(app);

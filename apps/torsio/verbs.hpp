@@ -15,6 +15,8 @@ void add_drift(CLI::App& app);
 void add_estimate(CLI::App& app);
 void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_search(CLI::App& app);
+void add_work(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);

@@ -1,17 +1,14 @@
 #include "torsio/evaluate/cross_validation.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
 #include "evaluate/common_samples.hpp"
-#include "evaluate/fit_and_score.hpp"
+#include "evaluate/fold_scores.hpp"
 
 namespace torsio {
 namespace {
-
-constexpr auto kFoldRoles = std::to_array<Role>({Role::train, Role::test});
 
 FoldStatistic statistic(const std::vector<const ResultRow*>& rows, Metrics Score::*metrics,
                         double Metrics::*member) {
@@ -125,45 +122,65 @@ Ranking CrossValidation::ranked() const noexcept {
   return all;
 }
 
+FoldScores::FoldScores(const Dataset& dataset, const FoldScheme& scheme,
+                       const std::vector<ModelChoice>& choices, std::uint64_t seed)
+    : choices_(choices),
+      validation_{.results = empty_results(dataset),
+                  .plan = plan_folds(dataset, scheme, seed),
+                  .ranking = {}},
+      totals_(choices.size()) {
+  validation_.results.label = validation_.plan.label;
+  for (const ModelChoice& choice : choices_) note_inputs(validation_.results, choice);
+  forget_only_set(validation_.results);
+  for (Fold& fold : validation_.plan.folds) segments_.push_back(std::exchange(fold.segments, {}));
+}
+
+void FoldScores::cut(std::size_t fold, Dataset& dataset) const {
+  for (std::size_t i = 0; i < dataset.records.size(); ++i)
+    dataset.records[i].segments = segments_[fold][i];
+}
+
+void FoldScores::add(std::size_t fold, const Dataset& dataset, std::vector<ScoredModel> models) {
+  Results& results = validation_.results;
+  results.rankings.push_back(rank_on_common_samples(dataset, Role::test, models));
+  results.rankings.back().split = Role::validation;
+  for (std::size_t i = 0; i < models.size(); ++i)
+    for (ResultRow& row : models[i].rows) {
+      if (row.split == Role::train) continue;
+      row.split = Role::validation;
+      row.fold = validation_.plan.folds[fold].name;
+      if (!row.recording) totals_[i].push_back(row);
+      results.rows.push_back(std::move(row));
+    }
+}
+
+CrossValidation FoldScores::summary() && {
+  for (std::size_t i = 0; i < choices_.size(); ++i)
+    validation_.ranking.push_back(summary_of(choices_[i], totals_[i]));
+  rank(validation_);
+  return std::move(validation_);
+}
+
 CrossValidation cross_validate(Dataset dataset, const std::vector<ModelChoice>& choices,
                                const FoldScheme& scheme, std::uint64_t seed, bool allow_leak,
                                const Progress& progress) {
-  CrossValidation validation{
-      .results = empty_results(dataset), .plan = plan_folds(dataset, scheme, seed), .ranking = {}};
-  Results& results = validation.results;
-  results.label = validation.plan.label;
-  for (const ModelChoice& choice : choices) note_inputs(results, choice);
-  forget_only_set(results);
+  FoldScores scores(dataset, scheme, choices, seed);
   InputSets input_sets(dataset, allow_leak);
-  std::vector<std::vector<ResultRow>> totals(choices.size());
   std::size_t done = 0;
-  const std::size_t fits = validation.plan.folds.size() * choices.size();
-  for (Fold& fold : validation.plan.folds) {
-    for (std::size_t i = 0; i < dataset.records.size(); ++i)
-      dataset.records[i].segments = std::move(fold.segments[i]);
-    fold.segments.clear();
+  const std::size_t fits = scores.plan().folds.size() * choices.size();
+  for (std::size_t fold = 0; fold < scores.plan().folds.size(); ++fold) {
+    scores.cut(fold, dataset);
     input_sets.forget_data();
     std::vector<ScoredModel> models;
     for (const ModelChoice& choice : choices) {
-      const Progress part = part_of(progress, done++, fits, choice.family + ", " + fold.name);
+      const Progress part =
+          part_of(progress, done++, fits, choice.family + ", " + scores.plan().folds[fold].name);
       models.push_back(fit_and_score(dataset, input_sets, choice, seed, kFoldRoles, part));
       models.back().trained.reset();
     }
-    results.rankings.push_back(rank_on_common_samples(dataset, Role::test, models));
-    for (std::size_t i = 0; i < choices.size(); ++i)
-      for (ResultRow& row : models[i].rows) {
-        if (row.split == Role::train) continue;
-        row.split = Role::validation;
-        row.fold = fold.name;
-        if (!row.recording) totals[i].push_back(row);
-        results.rows.push_back(std::move(row));
-      }
+    scores.add(fold, dataset, std::move(models));
   }
-  for (Ranking& of_fold : results.rankings) of_fold.split = Role::validation;
-  for (std::size_t i = 0; i < choices.size(); ++i)
-    validation.ranking.push_back(summary_of(choices[i], totals[i]));
-  rank(validation);
-  return validation;
+  return std::move(scores).summary();
 }
 
 }  // namespace torsio

@@ -54,31 +54,41 @@ ResultRow failed_row(const ModelChoice& choice, const Error& error) {
 InputSets::InputSets(const Dataset& dataset, bool allow_leak)
     : dataset_(dataset), allow_leak_(allow_leak) {}
 
-const std::string& InputSets::leak_of(const FeatureSpec& features) {
-  if (leak_features_ != features) {
-    leak_ = refuse_leak(dataset_, features, allow_leak_);
-    leak_features_ = features;
-  }
-  return leak_;
+std::string InputSets::leak_of(const FeatureSpec& features) {
+  const std::scoped_lock lock(guard_);
+  for (const auto& [known, leak] : leaks_)
+    if (known == features) return leak;
+  leaks_.emplace_back(features, refuse_leak(dataset_, features, allow_leak_));
+  return leaks_.back().second;
 }
 
-const LearningData& InputSets::data_of(const FeatureSpec& features) {
-  if (!data_ || data_features_ != features) {
-    data_.reset();
-    data_ = learning_data(dataset_, features);
-    data_features_ = features;
+std::shared_ptr<const LearningData> InputSets::data_of(const FeatureSpec& features) {
+  constexpr std::size_t kKept = 3;
+  const std::scoped_lock lock(guard_);
+  for (auto known = data_.begin(); known != data_.end(); ++known) {
+    if (known->first != features) continue;
+    std::rotate(known, known + 1, data_.end());
+    return data_.back().second;
   }
-  return *data_;
+  if (data_.size() == kKept) data_.erase(data_.begin());
+  data_.emplace_back(features,
+                     std::make_shared<const LearningData>(learning_data(dataset_, features)));
+  return data_.back().second;
+}
+
+void InputSets::forget_data() {
+  const std::scoped_lock lock(guard_);
+  data_.clear();
 }
 
 ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets, const ModelChoice& choice,
                           std::uint64_t seed, std::span<const Role> roles,
                           const Progress& progress) {
-  const std::string& leak = input_sets.leak_of(choice.features);
+  const std::string leak = input_sets.leak_of(choice.features);
   ScoredModel scored;
   try {
-    scored.trained =
-        train_model(dataset, input_sets.data_of(choice.features), choice, seed, progress);
+    const auto data = input_sets.data_of(choice.features);
+    scored.trained = train_model(dataset, *data, choice, seed, progress);
     const Estimator estimator = make_estimator(scored.trained->file);
     std::vector<SplitScore> of_roles = evaluate(estimator, dataset, roles, progress);
     for (std::size_t i = 0; i < roles.size(); ++i) {

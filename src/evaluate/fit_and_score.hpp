@@ -2,9 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/progress.hpp"
@@ -15,27 +18,26 @@
 // The steps of `compare` and `crossvalidate` for each model.
 namespace torsio {
 
-/// The data of one input set after another, made once for all models that share it, which are
-/// adjacent in a list of choices.
+/// The data of the input sets, each made once for the models that share it. For several threads.
 class InputSets {
  public:
   /// @param dataset must outlive this.
   InputSets(const Dataset& dataset, bool allow_leak);
 
   /// An input that the target was computed from, or empty. @throws UsageError as `refuse_leak`.
-  const std::string& leak_of(const FeatureSpec& features);
+  [[nodiscard]] std::string leak_of(const FeatureSpec& features);
+  /// The data are kept for the last few input sets that were asked for.
   /// @throws Error as `learning_data`, each time again.
-  const LearningData& data_of(const FeatureSpec& features);
+  [[nodiscard]] std::shared_ptr<const LearningData> data_of(const FeatureSpec& features);
   /// Call after a change of the dataset's segments: leaks are kept, the data are computed again.
-  void forget_data() noexcept { data_.reset(); }
+  void forget_data();
 
  private:
   const Dataset& dataset_;
   bool allow_leak_;
-  std::optional<FeatureSpec> leak_features_;
-  std::string leak_;
-  FeatureSpec data_features_;
-  std::optional<LearningData> data_;
+  std::mutex guard_;
+  std::vector<std::pair<FeatureSpec, std::string>> leaks_;
+  std::vector<std::pair<FeatureSpec, std::shared_ptr<const LearningData>>> data_;  // last used last
 };
 
 struct ScoredModel {

@@ -56,6 +56,7 @@ std::vector<FamilyInfo> static_families() {
            .in_search = true,
            .variations = {{"network", "standard_linear_solid"},
                           {"network", "generalised_maxwell(3)"}},
+           .typical_fit_s = 1.0,
            .describe = describe_network}),
   };
 }
@@ -64,7 +65,8 @@ std::vector<FamilyInfo> mixture_families() {
   return {family_of<fit_dgmm>(
               {.name = Dgmm::kFamily,
                .summary = "Gaussian mixture of target and inputs, learned sample by sample",
-               .variations = {{"components", "100"}, {"components", "1000"}}}),
+               .variations = {{"components", "100"}, {"components", "1000"}},
+               .typical_fit_s = 0.4}),
           family_of<fit_dgmm_paper>(
               {.name = "dgmm_paper",
                .summary = "Algorithm 1 of paper 000, the sign of its update corrected: for "

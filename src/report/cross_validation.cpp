@@ -93,6 +93,7 @@ std::string reason_outside_ranking(const FoldSummary& summary, bool is_possible)
   if (summary.failed_folds > 0)
     return fmt::format("{} in {} of {} folds; {}", summary.status, summary.failed_folds,
                        summary.folds + summary.failed_folds, summary.reason);
+  if (summary.status == "pruned") return "pruned in " + summary.reason;
   if (!is_possible || summary.ranked_folds > 0) return {};
   return fmt::format("guarded: in more than half of a fold that is ranked ({} % of all samples)",
                      percent_text(summary.guarded_share));

@@ -14,6 +14,7 @@
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/results.hpp"
+#include "torsio/search/structure_study.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -43,12 +44,15 @@ void run(CompareFlags& flags) {
   warn_of_other_motions(dataset, features);
   std::optional<torsio::StructureSearch> search;
   if (flags.models == torsio::kSearch) {
+    torsio::require_test_recordings(dataset);  // before the search, which may take hours
     const auto candidates = torsio::search_candidates(dataset, flags.data.wanted_inputs());
     remark(fmt::format(
-        "search: {} structures, each fitted on {} folds, then the best of each family: at least {} "
-        "fits, many of them slow. Ctrl-C stops it; --models with fewer families is quicker.",
-        candidates.size(), torsio::kSearchFolds, candidates.size() * torsio::kSearchFolds));
-    search = torsio::search_structures(dataset, candidates, flags.seed, flags.allow_leak,
+        "search: {} structures on {} folds, then the best of each family: minutes to hours, and "
+        "nothing is kept after Ctrl-C. torsio search --study NAME keeps it; --models with fewer "
+        "families is quicker.",
+        candidates.size(), torsio::kSearchFolds));
+    search = torsio::search_structures(dataset, candidates,
+                                       {.seed = flags.seed, .allow_leak = flags.allow_leak},
                                        progress.listener());
     if (search->winners.empty())
       throw torsio::Error({.problem = first_failure(search->scores.results)});

@@ -44,6 +44,9 @@ struct Comparison {
   std::optional<TrainedModel> best;
 };
 
+/// @throws UsageError if no recording has the role test, so that `compare` has nothing to rank on.
+void require_test_recordings(const Dataset& dataset);
+
 /// Trains every choice on the training recordings and scores it on the other roles. A fit that
 /// fails is a row with the reason. Models are ranked by the RMSE on the samples that no ranked model
 /// guarded (`Score::common`).
@@ -75,9 +78,11 @@ inline constexpr std::string_view kSearch = "search";
 /// Fits of each candidate.
 inline constexpr std::size_t kSearchFolds = 3;
 
+/// Structures chosen by cross-validation over the training records alone, so that held-out ones
+/// still choose nothing (`search_structures`).
 struct StructureSearch {
   std::vector<ModelChoice> winners;  ///< the best of each family, best family first
-  CrossValidation scores;            ///< scores of all candidates
+  CrossValidation scores;  ///< scores of all candidates but those that a halving step pruned
 };
 
 /// What a search tries: every choice of `model_choices(..., "all")`, linear systems, hysteresis and
@@ -85,14 +90,5 @@ struct StructureSearch {
 /// structures that people vary first, one at a time.
 [[nodiscard]] std::vector<ModelChoice> search_candidates(
     const Dataset& dataset, const std::vector<std::string>& wanted_inputs);
-
-/// Structures chosen by cross-validation over the training records alone, so that held-out ones
-/// still choose nothing: of each family the first in the ranking of `cross_validate`. A candidate
-/// that is not ranked is not chosen.
-/// @throws UsageError as `cross_validate`, Cancelled.
-[[nodiscard]] StructureSearch search_structures(const Dataset& dataset,
-                                                const std::vector<ModelChoice>& candidates,
-                                                std::uint64_t seed, bool allow_leak,
-                                                const Progress& progress = {});
 
 }  // namespace torsio

@@ -67,8 +67,8 @@ struct FoldSummary {
   bool leak = false;
   std::size_t folds = 0;  ///< folds in the statistics
   std::size_t failed_folds = 0;
-  std::string status = "ok";    ///< status of the first failure: failed, diverged
-  std::string reason = {};      ///< reason of the first failure
+  std::string status = "ok";    ///< status of the first failure: failed, diverged; or pruned
+  std::string reason = {};      ///< reason of the first failure, or why a search pruned it
   std::string worst_fold = {};  ///< by `common_rmse`, else by `rmse`
   FoldStatistic rmse = {};
   FoldStatistic mad = {};

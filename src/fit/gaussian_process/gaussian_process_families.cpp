@@ -23,6 +23,7 @@ std::vector<FamilyInfo> gaussian_process_families() {
       family_of<fit_gaussian_process>(
           {.name = GaussianProcess::kFamily,
            .summary = "exact Gaussian process over some hundred samples",
+           .typical_fit_s = 2.0,
            .describe = describe_kernel<GaussianProcess>}),
       family_of<fit_parametric_gp>(
           {.name = ParametricGp::kFamily,
@@ -35,7 +36,8 @@ std::vector<FamilyInfo> gaussian_process_families() {
            .only_if_named = true}),
       family_of<fit_variational_gp>({.name = "parametric_gp_variational",
                                      .summary = "the same by a variational bound, in closed form",
-                                     .model_family = ParametricGp::kFamily})};
+                                     .model_family = ParametricGp::kFamily,
+                                     .typical_fit_s = 1.0})};
 }
 
 }  // namespace torsio

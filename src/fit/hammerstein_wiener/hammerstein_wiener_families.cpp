@@ -53,6 +53,7 @@ std::vector<FamilyInfo> hammerstein_wiener_families() {
                           .only_if_named = true,
                           .in_search = true,
                           .variations = {{"map", "piecewise_linear"}},
+                          .typical_fit_s = 24.0,
                           .describe = describe})};
 }
 

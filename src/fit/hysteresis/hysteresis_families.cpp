@@ -18,12 +18,14 @@ std::vector<FamilyInfo> hysteresis_families() {
               {.name = ImprovedPrandtlIshlinskii::kFamily,
                .summary = "the same followed by a bent curve, thresholds growing with the rate",
                .only_if_named = true,
-               .in_search = true}),
+               .in_search = true,
+               .typical_fit_s = 0.5}),
           family_of<fit_bouc_wen>(
               {.name = BoucWenModel::kFamily,
                .summary = "spring and a smooth hysteresis: b + alpha k x + (1 - alpha) k z",
                .only_if_named = true,
-               .in_search = true}),
+               .in_search = true,
+               .typical_fit_s = 2.0}),
           family_of<fit_nonlinear_backlash>(
               {.name = NonlinearBacklash::kFamily,
                .summary = "a spring between two curves: clip(y + k dx, f_dc(x), f_ac(x))",

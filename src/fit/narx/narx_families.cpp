@@ -81,7 +81,8 @@ FamilyInfo narx_family(std::string_view summary, std::string_view name = Narx<M>
                                    .model_family = Narx<M>::kFamily,
                                    .only_if_named = true,
                                    .in_search = in_search,
-                                   .variations = std::move(variations)});
+                                   .variations = std::move(variations),
+                                   .typical_fit_s = 20.0});
 }
 
 }  // namespace

@@ -96,9 +96,7 @@ NetworkTrainer::NetworkTrainer(TrainingNetwork network, const NetworkTraining& s
 double NetworkTrainer::bytes(std::size_t steps, std::size_t windows) const noexcept {
   const std::size_t batch = std::min(settings_.batch, windows);
   const std::size_t chunks = chunks_of(batch);
-  const std::size_t threads = settings_.threads == 0
-                                  ? std::max<std::size_t>(1, std::thread::hardware_concurrency())
-                                  : settings_.threads;
+  const std::size_t threads = settings_.threads == 0 ? usual_threads() : settings_.threads;
   // A gradient of each chunk; weights, best weights, their packed copies and the optimiser's state.
   const auto tables = static_cast<double>(chunks + 8);
   const auto passes = static_cast<double>(std::min(threads, chunks));

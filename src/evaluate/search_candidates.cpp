@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <iterator>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -25,24 +24,6 @@ std::vector<ModelChoice> search_candidates(const Dataset& dataset,
       candidates.push_back(std::move(varied));
     }
   return candidates;
-}
-
-StructureSearch search_structures(const Dataset& dataset,
-                                  const std::vector<ModelChoice>& candidates, std::uint64_t seed,
-                                  bool allow_leak, const Progress& progress) {
-  StructureSearch search{.winners = {},
-                         .scores = cross_validate(dataset, candidates, {.folds = kSearchFolds},
-                                                  seed, allow_leak, progress)};
-  std::set<std::string> chosen;
-  for (const FoldSummary& summary : search.scores.ranking) {
-    if (summary.failed_folds > 0 || summary.ranked_folds == 0) continue;
-    if (!chosen.insert(summary.family).second) continue;
-    search.winners.push_back(*std::ranges::find_if(candidates, [&](const ModelChoice& choice) {
-      return choice.family == summary.family && choice.variant() == summary.variant &&
-             choice.input_set == summary.input_set;
-    }));
-  }
-  return search;
 }
 
 }  // namespace torsio

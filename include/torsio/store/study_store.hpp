@@ -1,0 +1,171 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/estimate.hpp"
+#include "torsio/store/store_address.hpp"
+
+namespace torsio {
+
+class Database;
+
+enum class TrialState : std::uint8_t { waiting, running, done, failed, pruned };
+[[nodiscard]] std::string_view name(TrialState state) noexcept;
+
+/// What is to be computed for one result: a fit of one structure on one fold, one specimen.
+struct Trial {
+  std::string key;          ///< unique within study and step: "mlp:layers=16-16|fold 2"
+  std::string spec = {};    ///< what the study's kind needs to run it
+  std::string group = {};   ///< trials between which halving steps choose; a family
+  std::string device = {};  ///< serial number of the device that it is about; may be empty
+  int step = 0;             ///< halving step, from 0
+  double priority = 0.0;    ///< higher ones are claimed first: the expected time in seconds
+};
+
+/// A study: a list of trials of one kind.
+struct StoredStudy {
+  std::int64_t id = 0;
+  std::string name;
+  std::string kind;            ///< "search"
+  std::string spec;            ///< all that a worker needs, as JSON
+  std::string torsio_version;  ///< version of the program that began it
+};
+
+/// A trial that this worker runs until its lease ends. `attempt` counts the claims of this trial:
+/// only the last one may write a result.
+struct Claim {
+  std::int64_t trial = 0;
+  std::int64_t study = 0;
+  std::int64_t attempt = 0;
+  std::string key;
+  std::string spec;
+  std::string group;
+  std::string device;
+  int step = 0;
+};
+
+/// The result of a trial. Times are for information: they are not the same in every run.
+struct TrialResult {
+  bool is_failed = false;
+  double value = kNotMeasured;  ///< by which trials are ranked, lowest first; NaN: not ranked
+  std::string reason = {};      ///< why it failed
+  std::string result = {};      ///< all scores, as JSON
+  std::string samples = {};     ///< large bytes, kept apart; may be empty
+  double seconds = 0.0;
+};
+
+/// A trial of a study with its state and result.
+struct TrialRecord {
+  std::int64_t id = 0;
+  Trial trial;
+  TrialState state = TrialState::waiting;
+  std::int64_t attempt = 0;
+  std::string worker = {};  ///< that runs it or ran it last
+  TrialResult result = {};
+};
+
+struct StudyCounts {
+  std::size_t waiting = 0;
+  std::size_t running = 0;
+  std::size_t finished = 0;        ///< done, failed or pruned
+  double finished_priority = 0.0;  ///< the sum of the priorities of these
+  double total_priority = 0.0;
+  [[nodiscard]] std::size_t total() const noexcept { return waiting + running + finished; }
+  [[nodiscard]] bool is_complete() const noexcept { return waiting + running == 0; }
+};
+
+/// The decision after a halving step of a group.
+struct HalvingDecision {
+  struct Pruned {
+    std::int64_t trial = 0;
+    std::string reason;
+  };
+  std::vector<Pruned> pruned = {};
+  std::vector<Trial> next = {};
+};
+
+/// Studies and their trials in SQLite or PostgreSQL, shared by the workers on any number of
+/// machines. A trial is claimed with a lease by the clock of the database; a worker that is killed
+/// or stopped for longer loses it, and its result is refused if it comes after all. So each trial has
+/// exactly one result.
+///
+/// All functions may be called by several threads. If a server is lost, they connect again and wait
+/// for it (`on_wait`), and repeat the transaction, which has no effect if it had happened.
+/// @throws Error as the database does: full disk, read only, no permission.
+class StudyStore {
+ public:
+  /// Called once when the server is lost and again when it is back (empty reason), and in between
+  /// each second (same reason): false ends the waiting with `Cancelled`.
+  using OnWait = std::function<bool(const std::string& reason)>;
+
+  /// Opens or creates the store and its tables. @throws Error also for a store of a newer version.
+  explicit StudyStore(const StoreAddress& address, OnWait on_wait = {});
+  ~StudyStore();
+  StudyStore(const StudyStore&) = delete;
+  StudyStore& operator=(const StudyStore&) = delete;
+
+  [[nodiscard]] const StoreAddress& address() const noexcept { return address_; }
+
+  /// The study of that name with its trials; one that exists is resumed, which adds nothing.
+  /// @throws UsageError if the study of that name is another one or of another version of torsio.
+  StoredStudy create_or_resume(const StoredStudy& study, std::span<const Trial> trials);
+  [[nodiscard]] std::optional<StoredStudy> find_study(std::string_view name);
+  [[nodiscard]] std::vector<StoredStudy> studies();
+  /// Adds trials; those whose key and step are there already are left as they are.
+  void add_trials(std::int64_t study, std::span<const Trial> trials);
+
+  /// The waiting trial of the highest priority; none: all are done or run elsewhere. Leases that
+  /// ended are taken back first; a trial that was lost three times has failed.
+  [[nodiscard]] std::optional<Claim> claim(std::int64_t study, std::string_view worker,
+                                           double lease_s);
+  /// Extends the lease. @returns false if another worker has the trial by now.
+  bool extend(const Claim& claim, double lease_s);
+  /// Writes the result. @returns false, and writes nothing, if the lease was lost.
+  bool finish(const Claim& claim, const TrialResult& result);
+  /// Gives the trial back, which counts as no loss: the user stopped the worker.
+  void give_back(const Claim& claim);
+
+  /// Gives trials back before their leases end, where `is_dead` is certain that the worker of that
+  /// name does not run any more. It counts as no loss. @returns their keys.
+  std::vector<std::string> take_back(std::int64_t study,
+                                     const std::function<bool(const std::string& worker)>& is_dead);
+
+  /// Where all trials of a group's halving step have finished and nothing was decided yet, calls
+  /// `decide` with them, in the order of their numbers, and enters its decision; for one worker at a
+  /// time. @returns whether anything was decided.
+  bool advance(std::int64_t study,
+               const std::function<HalvingDecision(const std::string& group, int step,
+                                                   std::span<const TrialRecord>)>& decide);
+
+  [[nodiscard]] StudyCounts counts(std::int64_t study);
+  /// All trials in the order of their numbers, without `samples`.
+  [[nodiscard]] std::vector<TrialRecord> trials(std::int64_t study);
+  /// One page of the table, lowest value first.
+  [[nodiscard]] std::vector<TrialRecord> best(std::int64_t study, std::size_t count,
+                                              std::size_t offset = 0);
+  /// All trials about a device, of all studies, oldest first.
+  [[nodiscard]] std::vector<TrialRecord> history(std::string_view device);
+  [[nodiscard]] std::string samples(std::int64_t trial);
+
+ private:
+  template <class Work>
+  auto with_connection(const Work& work);
+  void wait_for_server(const std::string& reason);
+
+  StoreAddress address_;
+  OnWait on_wait_;
+  std::mutex guard_;
+  std::unique_ptr<Database> database_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,20 @@
+#include "torsio/search/study_kinds.hpp"
+
+#include <fmt/format.h>
+
+#include "torsio/core/error.hpp"
+#include "torsio/search/specimen_study.hpp"
+#include "torsio/search/structure_study.hpp"
+
+namespace torsio {
+
+std::unique_ptr<StudyKind> make_study_kind(const StoredStudy& study, const Progress& progress) {
+  if (study.kind == kStructureStudy) return structure_study(study, progress);
+  if (study.kind == kSpecimenStudy) return specimen_study(study);
+  throw Error(
+      {.place = "study " + study.name,
+       .problem = fmt::format("this version of torsio cannot run its kind, '{}'", study.kind),
+       .advice = "Use the torsio that began it: " + study.torsio_version + "."});
+}
+
+}  // namespace torsio

@@ -1,0 +1,241 @@
+#include <fmt/format.h>
+
+#include "store/database.hpp"
+
+#if TORSIO_HAS_POSTGRESQL
+#include <libpq-fe.h>
+
+#include <charconv>
+#include <map>
+
+namespace torsio {
+namespace {
+
+// Numbers of types from PostgreSQL's catalogue (pg_type.dat), which do not change.
+constexpr Oid kBool = 16;
+constexpr Oid kBytea = 17;
+constexpr Oid kInt8 = 20;
+constexpr Oid kInt2 = 21;
+constexpr Oid kInt4 = 23;
+constexpr Oid kText = 25;
+constexpr Oid kFloat4 = 700;
+constexpr Oid kFloat8 = 701;
+
+struct FinishConnection {
+  void operator()(PGconn* connection) const noexcept { PQfinish(connection); }
+};
+struct ClearResult {
+  void operator()(PGresult* result) const noexcept { PQclear(result); }
+};
+using PostgresqlResult = std::unique_ptr<PGresult, ClearResult>;
+
+/// A message of the server without its line breaks and the word FATAL.
+std::string one_line(std::string_view text) {
+  std::string line;
+  for (const char c : text) line += c == '\n' || c == '\t' ? ' ' : c;
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  return line;
+}
+
+class PostgresqlDatabase final : public Database {
+ public:
+  explicit PostgresqlDatabase(const StoreAddress& address)
+      : name_(address.name()), url_(address.target) {
+    connect();
+  }
+
+  std::vector<DatabaseRow> execute(std::string_view sql,
+                                   const std::vector<DatabaseValue>& values) override {
+    std::vector<std::string> texts(values.size());
+    std::vector<const char*> pointers(values.size(), nullptr);
+    std::vector<int> lengths(values.size(), 0);
+    std::vector<int> formats(values.size(), 0);
+    std::vector<Oid> types(values.size(), 0);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      std::visit(
+          [&](const auto& value) {
+            using T = std::decay_t<decltype(value)>;
+            if constexpr (std::is_same_v<T, std::monostate>) {
+              return;
+            } else if constexpr (std::is_same_v<T, Blob>) {
+              pointers[i] = value.bytes.data();
+              lengths[i] = static_cast<int>(value.bytes.size());
+              formats[i] = 1;
+              types[i] = kBytea;
+            } else {
+              if constexpr (std::is_same_v<T, std::string>) {
+                texts[i] = value;
+                types[i] = kText;
+              } else {
+                texts[i] = fmt::format("{}", value);  // the shortest text that reads as the number
+                types[i] = std::is_same_v<T, double> ? kFloat8 : kInt8;
+              }
+              pointers[i] = texts[i].c_str();
+            }
+          },
+          values[i]);
+    }
+    const PostgresqlResult result(PQexecParams(connection_.get(), std::string(sql).c_str(),
+                                               static_cast<int>(values.size()), types.data(),
+                                               pointers.data(), lengths.data(), formats.data(), 0));
+    check(result.get());
+    std::vector<DatabaseRow> rows(static_cast<std::size_t>(PQntuples(result.get())));
+    for (std::size_t r = 0; r < rows.size(); ++r)
+      for (int c = 0; c < PQnfields(result.get()); ++c)
+        rows[r].push_back(value_at(result.get(), static_cast<int>(r), c));
+    return rows;
+  }
+
+  void run_script(const std::string& sql) override {
+    const PostgresqlResult result(PQexec(connection_.get(), sql.c_str()));
+    check(result.get());
+  }
+
+  void begin(std::int64_t lock) override {
+    run("BEGIN", {});
+    if (lock != 0) run("SELECT pg_advisory_xact_lock($1)", {lock});
+  }
+
+  void roll_back() noexcept override {
+    if (connection_) PQclear(PQexec(connection_.get(), "ROLLBACK"));
+  }
+
+  void reconnect() override {
+    connection_.reset();
+    connect();
+  }
+
+  bool has_table(std::string_view table) override {
+    return !run("SELECT 1 FROM pg_tables WHERE schemaname = current_schema() AND tablename = $1",
+                {std::string(table)})
+                .empty();
+  }
+  std::string_view now() const noexcept override {
+    return "extract(epoch FROM clock_timestamp())::float8";
+  }
+  std::string_view skip_locked() const noexcept override { return " FOR UPDATE SKIP LOCKED"; }
+  std::string_view counted_key() const noexcept override { return "BIGSERIAL PRIMARY KEY"; }
+  std::string_view bytes_type() const noexcept override { return "BYTEA"; }
+
+ private:
+  void connect() {
+    const char* const keywords[] = {"dbname",           "application_name", "connect_timeout",
+                                    "keepalives",       "keepalives_idle",  "keepalives_interval",
+                                    "keepalives_count", "client_encoding",  nullptr};
+    const char* const values[] = {url_.c_str(), "torsio", "10",   "1",    "20",
+                                  "5",          "3",      "UTF8", nullptr};
+    connection_.reset(PQconnectdbParams(keywords, values, 1));
+    if (PQstatus(connection_.get()) != CONNECTION_OK) refuse_connection();
+    PQsetNoticeProcessor(
+        connection_.get(), [](void*, const char*) {}, nullptr);
+    // A transaction that lasts pins old rows for all other workers: none of torsio's takes seconds.
+    run_script(
+        "SET idle_in_transaction_session_timeout = '60s'; SET statement_timeout = '120s'; "
+        "SET synchronous_commit = on");
+  }
+
+  [[noreturn]] void refuse_connection() const {
+    const std::string reason = one_line(PQerrorMessage(connection_.get()));
+    const bool wrong_login = PQconnectionNeedsPassword(connection_.get()) != 0 ||
+                             reason.find("authentication failed") != std::string::npos ||
+                             (reason.find("role") != std::string::npos &&
+                              reason.find("does not exist") != std::string::npos);
+    if (wrong_login)
+      throw Error({.place = name_,
+                   .problem = "the server refuses the user or the password (" + reason + ")",
+                   .advice = "Write them in the URL, postgresql://user:password@host/name, or the "
+                             "password in ~/.pgpass."});
+    if (reason.find("database") != std::string::npos &&
+        reason.find("does not exist") != std::string::npos)
+      throw Error({.place = name_,
+                   .problem = "the server has no such database (" + reason + ")",
+                   .advice = "Create it once with createdb, or correct the end of the URL."});
+    throw ConnectionLost({.place = name_,
+                          .problem = "the server does not answer (" + reason + ")",
+                          .advice = "Check the host and the port of the URL and that the server "
+                                    "runs."});
+  }
+
+  void check(const PGresult* result) const {
+    const ExecStatusType status = PQresultStatus(result);
+    if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK) return;
+    const char* const code = PQresultErrorField(result, PG_DIAG_SQLSTATE);
+    const std::string_view state = code == nullptr ? "" : code;
+    const std::string reason = one_line(result == nullptr ? PQerrorMessage(connection_.get())
+                                                          : PQresultErrorMessage(result));
+    // 08: connection, 57P: the server ends or starts, 40: the transaction is to be repeated.
+    if (state.empty() || state.starts_with("08") || state.starts_with("57P") ||
+        state.starts_with("40") || PQstatus(connection_.get()) != CONNECTION_OK)
+      throw ConnectionLost({.place = name_, .problem = "the connection was lost (" + reason + ")"});
+    ErrorReport report{.place = name_, .problem = reason};
+    if (state.starts_with("53")) {
+      report.problem = "the server has no space or memory left (" + reason + ")";
+      report.advice = "Nothing of this step was written. Free some, and start the command again.";
+    } else if (state == "25006") {
+      report.problem = "the database may only be read";
+      report.advice = "Give the URL of the primary server.";
+    } else if (state == "42501") {
+      report.problem = "this user may not write here (" + reason + ")";
+      report.advice = "Let the owner GRANT the rights, or use another user in the URL.";
+    }
+    throw Error(std::move(report));
+  }
+
+  static DatabaseValue value_at(const PGresult* result, int row, int column) {
+    if (PQgetisnull(result, row, column) != 0) return std::monostate{};
+    const char* const text = PQgetvalue(result, row, column);
+    const auto length = static_cast<std::size_t>(PQgetlength(result, row, column));
+    switch (PQftype(result, column)) {
+      case kBool: return std::int64_t{*text == 't' ? 1 : 0};
+      case kInt2:
+      case kInt4:
+      case kInt8: {
+        std::int64_t number = 0;
+        std::from_chars(text, text + length, number);
+        return number;
+      }
+      case kFloat4:
+      case kFloat8: {
+        double number = 0.0;
+        std::from_chars(text, text + length, number);  // reads Infinity and NaN, too
+        return number;
+      }
+      case kBytea: {
+        std::size_t size = 0;
+        unsigned char* const bytes =
+            PQunescapeBytea(reinterpret_cast<const unsigned char*>(text), &size);
+        Blob blob{std::string(reinterpret_cast<const char*>(bytes), size)};
+        PQfreemem(bytes);
+        return blob;
+      }
+      default: return std::string(text, length);
+    }
+  }
+
+  std::string name_;
+  std::string url_;
+  std::unique_ptr<PGconn, FinishConnection> connection_;
+};
+
+}  // namespace
+
+std::unique_ptr<Database> open_postgresql(const StoreAddress& address) {
+  return std::make_unique<PostgresqlDatabase>(address);
+}
+
+}  // namespace torsio
+
+#else
+
+namespace torsio {
+
+std::unique_ptr<Database> open_postgresql(const StoreAddress& address) {
+  throw Error({.place = address.name(),
+               .problem = "this build of torsio has no PostgreSQL client",
+               .advice = "Install libpq (Debian: libpq-dev) and build again, or use --store with "
+                         "the path of a SQLite file."});
+}
+
+}  // namespace torsio
+
+#endif

@@ -1,0 +1,30 @@
+#include "torsio/store/store_address.hpp"
+
+#include <cstddef>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+
+std::string StoreAddress::name() const {
+  if (kind == Kind::memory) return "store in memory";
+  if (kind == Kind::sqlite) return target;
+  const std::size_t host = target.find("://") + 3;
+  const std::size_t at = target.find('@', host);
+  const std::size_t colon = target.find(':', host);
+  if (at == std::string::npos || colon > at) return target;
+  return target.substr(0, colon) + target.substr(at);
+}
+
+StoreAddress store_address(std::string_view text) {
+  if (text.starts_with("postgresql://") || text.starts_with("postgres://"))
+    return {.kind = StoreAddress::Kind::postgresql, .target = std::string(text)};
+  if (text.empty() || text.find("://") != std::string_view::npos)
+    throw UsageError({.place = "--store",
+                      .expected = "the path of a SQLite file, or a URL such as "
+                                  "postgresql://user@host:5432/torsio",
+                      .found = text.empty() ? "nothing" : '"' + std::string(text) + '"'});
+  return {.kind = StoreAddress::Kind::sqlite, .target = std::string(text)};
+}
+
+}  // namespace torsio
