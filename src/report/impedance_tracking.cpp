@@ -141,6 +141,12 @@ Json document(const ImpedanceRun& run) {
           {"hand", hand_json(run.hand)}};
 }
 
+/// Where the wanted impedance and the inertia of the joint nearly cancel in the linear model.
+bool is_antiresonance(const ImpedancePoint& point) {
+  constexpr double kLeft = 0.5;
+  return std::abs(point.linear_Nm_rad) < kLeft * std::abs(point.wanted_Nm_rad);
+}
+
 /// |rendered - wanted| over |wanted|, the mean of the frequencies up to 1 Hz.
 double error_of(const ImpedanceRun& run) {
   double sum = 0.0;
@@ -180,20 +186,28 @@ std::string impedance_text(const ImpedanceRun& run) {
   TextTable table;
   table.header({"Hz", "wanted Nm/rad", "deg", "linear model", "deg", "rendered", "deg",
                 "rendered / linear"});
-  for (const ImpedancePoint& point : run.points)
+  bool has_antiresonance = false;
+  for (const ImpedancePoint& point : run.points) {
+    has_antiresonance |= is_antiresonance(point);
     table.row({fmt::format("{:g}", point.frequency_Hz), size_text(point.wanted_Nm_rad),
                angle_text(point.wanted_Nm_rad), size_text(point.linear_Nm_rad),
                angle_text(point.linear_Nm_rad), size_text(point.rendered_Nm_rad),
                angle_text(point.rendered_Nm_rad),
-               fmt::format("{:.3f}", std::abs(point.rendered_Nm_rad / point.linear_Nm_rad))});
+               is_antiresonance(point)
+                   ? "-"
+                   : fmt::format("{:.3f}", std::abs(point.rendered_Nm_rad / point.linear_Nm_rad))});
+  }
   return fmt::format(
       "{} ({}), {}, seed {}\n"
       "{}{}; at rest {:.4g} Nm/rad\n{}"
       "torque over angle at the output, sines of {:g} Nm; linear model: without dry friction, with "
-      "the inertia of the joint\n{}"
+      "the inertia of the joint\n{}{}"
       "cycles with limited current: {:.3g} %\n{}",
       run.actuator, run.variant, task(run), run.seed, model_text(run), gains_text(run),
       run.stiffness_Nm_rad, passivity_text(run), run.amplitude_Nm, table.text(),
+      has_antiresonance ? "-: an antiresonance, at which the linear model is near 0 and the dry "
+                          "friction is all that is left: no ratio\n"
+                        : "",
       100.0 * run.limited_share, hand_text(run));
 }
 

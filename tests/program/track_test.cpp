@@ -210,5 +210,43 @@ TEST_F(TrackVerb, RefusesContradictionsOfTheImpedance) {
             flag.substr(0, flag.find(' ')) + ": it belongs to the torque loop");
 }
 
+TEST_F(TrackVerb, WarnsOfAModelOfAnotherSpringInAnImpedanceToo) {
+  ASSERT_EQ(torsio("simulate dfki-120 static-cycle --duration 20s -o other.csv").exit_code, 0);
+  ASSERT_EQ(torsio("fit other.csv --model linear -o other.safetensors").exit_code, 0);
+  ASSERT_EQ(torsio("simulate dfki-50 static-cycle --duration 20s -o own.csv").exit_code, 0);
+  ASSERT_EQ(torsio("fit own.csv --model linear -o own.safetensors").exit_code, 0);
+  // With another zero of an encoder the same spring has a deflection at 0 Nm.
+  ASSERT_EQ(shell("awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "
+                  "\"joint_angle_rad\") c = i } NR > 1 { $c += 0.05 } 1' own.csv > moved.csv")
+                .exit_code,
+            0);
+  ASSERT_EQ(torsio("fit moved.csv --model linear -o moved.safetensors").exit_code, 0);
+  const std::string call =
+      "track --actuator dfki-50 --impedance 50Nm_rad --impedance-damping 1Nms_rad --duration 10s "
+      "--model ";
+  EXPECT_EQ(torsio(call + "own.safetensors").err.find("warning"), std::string::npos);
+  const Outcome other = torsio(call + "other.safetensors");
+  EXPECT_NE(other.err.find("was it trained on another actuator"), std::string::npos) << other.err;
+  const Outcome moved = torsio(call + "moved.safetensors");
+  EXPECT_NE(moved.err.find("warning: at 0 Nm moved.safetensors deflects the spring by"),
+            std::string::npos)
+      << moved.err;
+}
+
+TEST_F(TrackVerb, TakesZerosOfAModelAsThoseOfSimulatedEncoders) {
+  folder_.file("zero.yaml",
+               "zero: [{channel: gear_angle_rad, first: 0.02s}, {channel: joint_angle_rad, first: "
+               "0.02s}]\n");
+  ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o a.csv").exit_code, 0);
+  ASSERT_EQ(
+      torsio("fit a.csv --mapping zero.yaml --model linear_coulomb -o z.safetensors").exit_code, 0);
+  for (const char* loop : {"", "--impedance 50Nm_rad --impedance-damping 1Nms_rad "}) {
+    const Outcome outcome = torsio(std::string("track --actuator dfki-50 --duration 10s ") + loop +
+                                   "--model z.safetensors");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err.find("warning"), std::string::npos) << outcome.err;
+  }
+}
+
 }  // namespace
 }  // namespace torsio::test

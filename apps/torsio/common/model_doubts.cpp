@@ -15,23 +15,31 @@ namespace {
 
 constexpr int kSettled = 2000;  // ticks of 1 ms
 
-/// Deflection range from -torque to torque with the joint at rest; none if the inverse has no
-/// solution.
-std::optional<double> deflection_range_rad(torsio::AnyInverse inverse, double torque_Nm) {
-  double range_rad = 0.0;
-  for (const double sign : {-1.0, 1.0}) {
+/// Deflections with the joint at rest, as an inverse has them.
+struct Deflections {
+  double range_rad = 0.0;  ///< from -torque to torque
+  double rest_rad = 0.0;   ///< at 0 Nm
+};
+
+/// None if the inverse has no solution.
+std::optional<Deflections> deflections_of(torsio::AnyInverse inverse, double torque_Nm) {
+  const auto settled_rad = [&](double at_Nm) -> std::optional<double> {
     inverse.reset();
     torsio::Estimate inverted;
     for (int tick = 0; tick < kSettled; ++tick)
-      inverted = inverse.step(sign * torque_Nm, {.t_s = 1e-3 * tick,
-                                                 .motor_angle_rad = 0.0,
-                                                 .gear_angle_rad = 0.0,
-                                                 .joint_angle_rad = 0.0,
-                                                 .motor_current_A = 0.0});
+      inverted = inverse.step(at_Nm, {.t_s = 1e-3 * tick,
+                                      .motor_angle_rad = 0.0,
+                                      .gear_angle_rad = 0.0,
+                                      .joint_angle_rad = 0.0,
+                                      .motor_current_A = 0.0});
     if (inverted.fault != torsio::Fault::none) return std::nullopt;
-    range_rad += sign * inverted.value;
-  }
-  return range_rad;
+    return inverted.value;
+  };
+  const auto low = settled_rad(-torque_Nm);
+  const auto high = settled_rad(torque_Nm);
+  const auto rest = settled_rad(0.0);
+  if (!low || !high || !rest) return std::nullopt;
+  return Deflections{*high - *low, *rest};
 }
 
 }  // namespace
@@ -40,16 +48,29 @@ void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse
                             const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
                             double torque_Nm) {
   constexpr double kAnother = 1.4;  // hysteresis and wear of one spring remain below it
-  const auto inverted = deflection_range_rad(std::move(inverse), torque_Nm);
-  const auto swept = deflection_range_rad(line, torque_Nm);
-  if (!inverted || !swept || !(*inverted > 0.0)) return;
-  const double ratio = *inverted / *swept;
-  if (ratio < kAnother && ratio > 1.0 / kAnother) return;
-  remark(
-      fmt::format("warning: for {:.3g} Nm {} deflects the spring {:.2g} times as far as the linear "
-                  "model of {} does: was it "
-                  "trained on another actuator?",
-                  torque_Nm, model, ratio, sheet.name));
+  constexpr double kAnotherZero = 0.25;
+  const auto inverted = deflections_of(std::move(inverse), torque_Nm);
+  const auto swept = deflections_of(line, torque_Nm);
+  if (!swept) return;
+  if (!inverted) {
+    remark(
+        fmt::format("warning: {} has no deflection for -{:.3g}, 0 or {:.3g} Nm: was it trained on "
+                    "another actuator than {}?",
+                    model, torque_Nm, torque_Nm, sheet.name));
+    return;
+  }
+  const double ratio = inverted->range_rad / swept->range_rad;
+  if (ratio > 0.0 && (ratio >= kAnother || ratio <= 1.0 / kAnother))
+    remark(
+        fmt::format("warning: for {:.3g} Nm {} deflects the spring {:.2g} times as far as the "
+                    "linear model of {} does: was it trained on another actuator?",
+                    torque_Nm, model, ratio, sheet.name));
+  const double apart_rad = inverted->rest_rad - swept->rest_rad;
+  if (std::abs(apart_rad) > kAnotherZero * swept->range_rad)
+    remark(
+        fmt::format("warning: at 0 Nm {} deflects the spring by {:.3g} rad more than the linear "
+                    "model of {} does: had the encoders another zero when it was trained?",
+                    model, apart_rad, sheet.name));
 }
 
 void warn_of_failed_checks(const torsio::FitCheck& check) {

@@ -24,8 +24,8 @@ void warn_of_missing_zeros(const torsio::ModelFile& file, const torsio::Dataset&
 /// Warns of recordings whose torque over the first input differs from that of the training data by
 /// the factor between two units.
 void warn_of_another_unit(const torsio::ModelFile& file, const torsio::Dataset& dataset);
-/// Warns of an inverse whose deflection for `torque_Nm` at rest is far from that of the actuator's
-/// linear model: the model was trained on another spring.
+/// Warns of an inverse whose deflection for `torque_Nm` or for 0 Nm at rest is far from that of the
+/// actuator's linear model: the model was trained on another spring, or with other zeros of its encoders.
 void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse,
                             const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
                             double torque_Nm);

@@ -2,9 +2,11 @@
 
 #include <optional>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "common/data_flags.hpp"
+#include "common/model_doubts.hpp"
 #include "common/progress_bar.hpp"
 #include "core/quantity.hpp"
 #include "torsio/core/error.hpp"
@@ -78,6 +80,21 @@ std::vector<torsio::ImpedanceModel> models_of(const std::vector<std::string>& pa
   return models;
 }
 
+void warn_of_other_springs(const std::vector<torsio::ImpedanceModel>& models,
+                           const torsio::DataSheet& sheet, const ImpedanceSpec& spec,
+                           const torsio::Progress& progress) {
+  std::optional<torsio::LinearInverse> linear;
+  for (const torsio::ImpedanceModel& model : models) {
+    const auto* const inverse = std::get_if<torsio::AnyInverse>(&model.use);
+    if (inverse == nullptr) continue;
+    if (!linear) linear = torsio::spring_line(sheet, kDefaultSeed, progress);
+    constexpr double kShare = 0.1;  // as half the amplitude that `ImpedanceSpec` has by default
+    warn_of_another_spring(
+        model.name, *inverse, *linear, sheet,
+        spec.amplitude_Nm ? 0.5 * *spec.amplitude_Nm : kShare * sheet.rating.torque_Nm.value);
+  }
+}
+
 }  // namespace
 
 void ImpedanceFlags::add(CLI::App& verb) {
@@ -127,8 +144,10 @@ void run_impedance(const ImpedanceFlags& flags, const SharedTrackFlags& shared) 
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(shared.actuator, progress.listener());
   const torsio::ImpedanceSpec spec = spec_of(flags, shared);
-  const std::vector<torsio::ImpedanceRun> runs = torsio::track_impedances(
-      sheet, spec, models_of(shared.models, sheet), shared.seed, progress.listener());
+  const std::vector<torsio::ImpedanceModel> models = models_of(shared.models, sheet);
+  warn_of_other_springs(models, sheet, spec, progress.listener());
+  const std::vector<torsio::ImpedanceRun> runs =
+      torsio::track_impedances(sheet, spec, models, shared.seed, progress.listener());
   if (!shared.record.empty()) torsio::write_recording(runs.back().record, shared.record);
   if (shared.json.wants_tables()) print(torsio::impedance_text(runs));
   shared.json.write(torsio::impedance_json(runs));

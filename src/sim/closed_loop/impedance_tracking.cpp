@@ -85,59 +85,90 @@ bool is_stable_with(ImpedancePlan plan, const JointImpedance::Gains& gains) {
   return LinearImpedance(plan).is_stable();
 }
 
-/// The values of a gain, geometrically from below, up to the first that is (not) stable.
-/// @returns the first stable one, or the last before one that is not stable; none if there is none
+/// @param stable @param other gains, of which only the first is stable
+/// @returns the stable gain next to the boundary between them
+template <class GainsOf>
+double stable_up_to(const ImpedancePlan& plan, double stable, double other,
+                    const GainsOf& gains_of) {
+  constexpr int kHalvings = 20;
+  for (int n = 0; n < kHalvings; ++n) {
+    const double middle = std::sqrt(stable * other);
+    (is_stable_with(plan, gains_of(middle)) ? stable : other) = middle;
+  }
+  return stable;
+}
+
+/// The values of a gain from below, geometrically up to the first that is (not) stable, then by
+/// bisection: the result depends on `lowest` only if it is stable in several ranges.
+/// @returns the least stable one, or the largest below those that are not; none if there is none
 template <class GainsOf>
 std::optional<double> find_gain(const ImpedancePlan& plan, double lowest, double highest,
                                 bool looks_for_stable, const GainsOf& gains_of) {
   constexpr double kGainStep = 1.1;
   std::optional<double> last;
-  if (!(lowest > 0.0)) return last;
-  const auto steps = static_cast<int>(std::log(highest / lowest) / std::log(kGainStep));
-  double value = lowest;
-  for (int n = 0; n <= steps; ++n, value *= kGainStep) {
+  for (double value = lowest; value > 0.0 && value <= highest; value *= kGainStep) {
     const bool is_stable = is_stable_with(plan, gains_of(value));
-    if (looks_for_stable && is_stable) return value;
-    if (!looks_for_stable && !is_stable) return last;
-    if (!looks_for_stable) last = value;
+    if (looks_for_stable && is_stable)
+      return last ? stable_up_to(plan, value, *last, gains_of) : value;
+    if (!looks_for_stable && !is_stable)
+      return last ? std::optional(stable_up_to(plan, *last, value, gains_of)) : std::nullopt;
+    last = value;
   }
-  return last;
+  return looks_for_stable ? std::nullopt : last;
+}
+
+/// With three digits, none of them rounded up, or none down.
+double three_digits(double value, bool rounds_up) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
+  return unit * (rounds_up ? std::ceil(value / unit) : std::floor(value / unit));
+}
+
+double spring_stiffness_Nm_rad(const ImpedancePlan& plan) {
+  return std::get<ImpedancePlan::Spring>(plan.controller).torque.deflection.joint.stiffness_Nm_rad;
 }
 
 /// The least damping that makes a stiffness stable; none if there is none.
 std::optional<double> stable_damping(const ImpedancePlan& plan, double stiffness_Nm_rad) {
-  constexpr double kShortest_s = 1e-4;
+  constexpr double kShortest_s = 1e-5;
   constexpr double kLongest_s = 1.0;
-  return find_gain(plan, kShortest_s * stiffness_Nm_rad, kLongest_s * stiffness_Nm_rad, true,
-                   [&](double value) {
-                     return JointImpedance::Gains{stiffness_Nm_rad, value};
-                   });
+  const auto found = find_gain(plan, kShortest_s * spring_stiffness_Nm_rad(plan),
+                               kLongest_s * stiffness_Nm_rad, true, [&](double value) {
+                                 return JointImpedance::Gains{stiffness_Nm_rad, value};
+                               });
+  return found ? std::optional(three_digits(*found, true)) : std::nullopt;
 }
 
 std::string stable_gains(const ImpedancePlan& plan, const JointImpedance::Gains& gains) {
   constexpr double kSmallest = 1e-4;
-  constexpr double kRounding = 1.01;  // more than that of three digits
-  const auto stiffness = find_gain(plan, kSmallest * gains.stiffness_Nm_rad, gains.stiffness_Nm_rad,
-                                   false, [&](double value) {
+  constexpr double kFirstStep = 1.1;
+  const auto stiffness = find_gain(plan, kSmallest * spring_stiffness_Nm_rad(plan),
+                                   kFirstStep * gains.stiffness_Nm_rad, false, [&](double value) {
                                      return JointImpedance::Gains{value, gains.damping_Nms_rad};
                                    });
   const auto damping = stable_damping(plan, gains.stiffness_Nm_rad);
   std::vector<std::string> ways;
-  double less_Nms_rad = gains.damping_Nms_rad;
-  for (int n = 0; n < 100 && less_Nms_rad > 0.0; ++n, less_Nms_rad /= 1.1)
-    if (is_stable_with(plan, {gains.stiffness_Nm_rad, less_Nms_rad / kRounding})) {
-      ways.push_back(fmt::format("a damping of at most {:.3g} Nms/rad", less_Nms_rad / kRounding));
+  double less_Nms_rad = gains.damping_Nms_rad / kFirstStep;
+  const auto with_damping = [&](double value) {
+    return JointImpedance::Gains{gains.stiffness_Nm_rad, value};
+  };
+  for (int n = 0; n < 100 && less_Nms_rad > 0.0; ++n, less_Nms_rad /= kFirstStep)
+    if (is_stable_with(plan, with_damping(less_Nms_rad))) {
+      const double largest_Nms_rad =
+          stable_up_to(plan, less_Nms_rad, kFirstStep * less_Nms_rad, with_damping);
+      ways.push_back(
+          fmt::format("a damping of at most {:.3g} Nms/rad", three_digits(largest_Nms_rad, false)));
       break;
     }
   if (damping && gains.damping_Nms_rad < *damping)
-    ways.push_back(fmt::format("a damping from {:.3g} Nms/rad on", kRounding * *damping));
+    ways.push_back(fmt::format("a damping from {:.3g} Nms/rad on", *damping));
   if (stiffness)
-    ways.push_back(fmt::format("at most {:.3g} Nm/rad with this damping", *stiffness / kRounding));
+    ways.push_back(
+        fmt::format("at most {:.3g} Nm/rad with this damping", three_digits(*stiffness, false)));
   double softer_Nm_rad = 0.5 * gains.stiffness_Nm_rad;
   for (int n = 0; ways.empty() && n < 10; ++n, softer_Nm_rad *= 0.5)
     if (const auto found = stable_damping(plan, softer_Nm_rad))
-      ways.push_back(fmt::format("for example {:.3g} Nm/rad with {:.3g} Nms/rad", softer_Nm_rad,
-                                 kRounding * *found));
+      ways.push_back(
+          fmt::format("for example {:.3g} Nm/rad with {:.3g} Nms/rad", softer_Nm_rad, *found));
   return ways.empty() ? "another bandwidth" : fmt::format("{}", fmt::join(ways, ", or "));
 }
 
@@ -376,10 +407,11 @@ ImpedanceModel impedance_model(std::string name, const ModelFile& model, const D
   }
   Estimator estimator = make_estimator(model, estimator_rate_Hz(model));
   const EstimatorSettings& settings = estimator.settings();
-  if (settings.target != "torque_Nm" || !settings.zeroed_channels.empty())
+  if (settings.target != "torque_Nm")
     throw Error({.place = kImpedance,
-                 .expected = "a model of torque_Nm without zero rules, or one with an inverse",
+                 .expected = "a model of torque_Nm, or one with an inverse",
                  .found = fmt::format("a model of {}; {}", settings.target, reason)});
+  for (const std::string& channel : settings.zeroed_channels) estimator.set_zero(channel, 0.0);
   (void)sensed_inputs(sheet, estimator.raw_inputs(), kImpedance);
   return {.name = std::move(name), .use = std::move(estimator), .reason = std::move(reason)};
 }

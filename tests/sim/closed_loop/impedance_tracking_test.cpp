@@ -1,5 +1,6 @@
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -214,6 +215,46 @@ TEST(ImpedanceTracking, ProposesStableGains) {
       EXPECT_EQ(refusal(stiff_Nm_rad, damping_Nms_rad), "") << actuator;
     }
   }
+}
+
+// The figure belongs to the joint, not to the stiffness that was refused, and is the border.
+TEST(ImpedanceTracking, ProposesTheSameLargestStiffnessForEveryRequest) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  const auto refusal = [&](double stiffness_Nm_rad) {
+    return test::error_message([&] {
+      static_cast<void>(track_impedance(sheet,
+                                        {.kind = ImpedanceSpec::Kind::wanted,
+                                         .stiffness_Nm_rad = stiffness_Nm_rad,
+                                         .duration_s = 10.0},
+                                        1));
+    });
+  };
+  const std::string words = "at most ";
+  const std::string first = refusal(100.0);
+  ASSERT_NE(first.find(words), std::string::npos) << first;
+  const double largest_Nm_rad = std::stod(first.substr(first.find(words) + words.size()));
+  for (const double stiffness_Nm_rad : {97.0, 107.0, 123.0, 200.0, 281.0}) {
+    const std::string message = refusal(stiffness_Nm_rad);
+    EXPECT_NE(message.find(fmt::format("at most {:g} Nm/rad with this damping", largest_Nm_rad)),
+              std::string::npos)
+        << message;
+  }
+  EXPECT_EQ(refusal(largest_Nm_rad), "");
+  EXPECT_NE(refusal(1.01 * largest_Nm_rad), "") << "not 1 % below the border";
+}
+
+TEST(ImpedanceTracking, HasNoRatioAtAnAntiresonance) {
+  const ImpedanceRun run = track_impedance(
+      data_sheet("dfki-50"),
+      {.kind = ImpedanceSpec::Kind::wanted, .stiffness_Nm_rad = 50.0, .duration_s = 10.0}, 1);
+  const std::string text = impedance_text(run);
+  EXPECT_NE(text.find("-: an antiresonance"), std::string::npos) << text;
+  ImpedanceRun without = run;
+  std::erase_if(without.points, [](const ImpedancePoint& point) {
+    return std::abs(point.linear_Nm_rad) < 0.5 * std::abs(point.wanted_Nm_rad);
+  });
+  EXPECT_LT(without.points.size(), run.points.size());
+  EXPECT_EQ(impedance_text(without).find("antiresonance"), std::string::npos);
 }
 
 Dataset recordings_of(const char* actuator, const ExperimentSpec& spec, int count) {

@@ -54,8 +54,8 @@ struct ImpedanceModel {
 
 /// The use that an actuator has for a model. An estimator runs at the rate of its training if the
 /// 1 kHz of the loop are a multiple of it, and the loop holds the estimate in between; else at 1 kHz.
-/// @throws Error if the model can do neither, or requires the zero of a channel or a channel that
-/// the bench does not have.
+/// Zeros that the model requires are 0, those of simulated encoders.
+/// @throws Error if the model can do neither, or requires a channel that the bench does not have.
 [[nodiscard]] ImpedanceModel impedance_model(std::string name, const ModelFile& model,
                                              const DataSheet& sheet);
 

@@ -137,9 +137,9 @@ struct TrackingRun {
                                 const AnyInverse& inverse, std::uint64_t seed,
                                 const Progress& progress = {});
 
-/// The inverse that a model file's model gives a loop at 1 kHz.
-/// @throws Error as `AnyInverse::of`, or if the model cannot run at that rate, or requires the
-/// zero of a channel that no one sets here.
+/// The inverse that a model file's model gives a loop at 1 kHz. Zeros that the model requires are 0:
+/// simulated encoders have no other.
+/// @throws Error as `AnyInverse::of`, or if the model cannot run at that rate.
 [[nodiscard]] AnyInverse inverse_of(const ModelFile& model);
 
 /// What `track` calls the line of `sweep_line` where others are model files: a documented keyword
