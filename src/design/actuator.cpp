@@ -274,14 +274,18 @@ const DriveLimit& DriveCandidate::binding() const {
   return *std::ranges::min_element(limits, {}, [](const DriveLimit& of) { return of.share(); });
 }
 
-ActuatorDesign design_actuator(const ActuatorDemand& demand, const DriveTable& drives,
-                               const std::string& name) {
-  check(demand);
+SpringDemand spring_demand(const ActuatorDemand& demand) {
   SpringDemand of_spring = demand.envelope;
   of_spring.torque_Nm = demand.peak_Nm;
   of_spring.angle_rad = demand.deflection_rad;
   of_spring.load_inertia_kg_m2 = demand.link_inertia_kg_m2;
-  ActuatorDesign design{.spring = design_lightest_spring(of_spring), .candidates = {}};
+  return of_spring;
+}
+
+ActuatorDesign design_actuator(const ActuatorDemand& demand, const DriveTable& drives,
+                               const std::string& name) {
+  check(demand);
+  ActuatorDesign design{.spring = design_lightest_spring(spring_demand(demand)), .candidates = {}};
   if (!design.spring.is_feasible) {
     design.infeasible = design.spring.infeasible;
     return design;

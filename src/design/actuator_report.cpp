@@ -174,7 +174,7 @@ DesignReport actuator_report(const ActuatorDemand& d, const ActuatorDesign& desi
   DesignSection spring = design.spring.dimensions;
   spring.name = "spring";
   report.sections.push_back(std::move(spring));
-  note_fatigue(report, d.envelope, design.spring);
+  note_fatigue(report, spring_demand(d), design.spring, false);
   report.pictures = {pareto_figure(design), map_figure(d, c)};
   if (design.is_feasible) {
     report.pictures.push_back(loop_figure(d, c));

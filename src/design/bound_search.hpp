@@ -37,9 +37,10 @@ template <class Demand, class Feasible>
       moved.*bound.value = middle;
       (is_feasible(moved) ? loose : tight) = middle;
     }
-    text += fmt::format("{}the {} of {:.4g} {} would have to move to {:.4g} {}",
+    const std::string unit = *bound.unit == '\0' ? std::string() : fmt::format(" {}", bound.unit);
+    text += fmt::format("{}the {} of {:.4g}{} would have to move to {:.4g}{}",
                         text.empty() ? "" : ", or ", bound.name, demand.*bound.value * bound.scale,
-                        bound.unit, loose * bound.scale, bound.unit);
+                        unit, loose * bound.scale, unit);
   }
   return "infeasible: " +
          (text.empty() ? std::string("no single bound that is moved makes it possible") : text);

@@ -144,7 +144,6 @@ const DesignFigure& DesignReport::at(const std::string& section, const std::stri
 
 std::string design_text(const DesignReport& report) {
   std::string text;
-  if (!report.is_feasible) text += report.infeasible + "\n";
   for (const DesignSection& section : report.sections) {
     TextTable table;
     table.header({section.name, "value", "unit", "remark"});

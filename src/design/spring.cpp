@@ -22,16 +22,6 @@ constexpr std::array<std::string_view, 4> kShapeNames{"rod", "tube", "coils", "d
 constexpr std::array kKinds{SpringKind::rod, SpringKind::tube, SpringKind::coils,
                             SpringKind::discs};
 
-std::optional<SpringDesign> best_of(const SpringDemand& d, SpringKind kind) {
-  switch (kind) {
-    case SpringKind::rod: return best_rod(d);
-    case SpringKind::tube: return best_tube(d);
-    case SpringKind::coils: return best_coils(d);
-    case SpringKind::discs: return best_discs(d);
-  }
-  return std::nullopt;
-}
-
 std::string infeasible(const SpringDemand& d, SpringKind kind) {
   using D = SpringDemand;
   std::vector<DesignBound<D>> bounds{
@@ -84,6 +74,16 @@ void check(const SpringDemand& d) {
 }
 
 }  // namespace
+
+std::optional<SpringDesign> best_of(const SpringDemand& d, SpringKind kind) {
+  switch (kind) {
+    case SpringKind::rod: return best_rod(d);
+    case SpringKind::tube: return best_tube(d);
+    case SpringKind::coils: return best_coils(d);
+    case SpringKind::discs: return best_discs(d);
+  }
+  return std::nullopt;
+}
 
 std::string_view name_of(SpringKind kind) noexcept {
   return kShapeNames.at(static_cast<std::size_t>(kind));

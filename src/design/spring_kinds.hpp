@@ -22,5 +22,6 @@ inline double wanted_stiffness(const SpringDemand& d) { return d.torque_Nm / d.a
 [[nodiscard]] std::optional<SpringDesign> best_tube(const SpringDemand& d);
 [[nodiscard]] std::optional<SpringDesign> best_coils(const SpringDemand& d);
 [[nodiscard]] std::optional<SpringDesign> best_discs(const SpringDemand& d);
+[[nodiscard]] std::optional<SpringDesign> best_of(const SpringDemand& d, SpringKind kind);
 
 }  // namespace torsio

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <utility>
 #include <variant>
 
+#include "spring_kinds.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/design/spring.hpp"
@@ -58,14 +61,74 @@ DesignTable kinds_table(const SpringDemand& d, const SpringDesign& design,
   return table;
 }
 
+/// The spring that a call with this demand designs.
+std::optional<SpringDesign> designed(const SpringDemand& d, std::optional<SpringKind> kind) {
+  if (kind) return best_of(d, *kind);
+  const SpringDesign lightest = design_lightest_spring(d);
+  return lightest.is_feasible ? std::optional(lightest) : std::nullopt;
+}
+
+bool lasts(const SpringDemand& d, std::optional<SpringKind> kind) {
+  const auto design = designed(d, kind);
+  return design && design->fatigue_margin >= 1.0;
+}
+
+constexpr double kFurthest = 5.0;  // times a bound, as the message of an infeasible design
+
+/// The least bound in whole millimetres with which the spring lasts; none up to `kFurthest` times it.
+std::optional<double> lasting_bound_mm(SpringDemand d, double SpringDemand::*bound,
+                                       std::optional<SpringKind> kind) {
+  auto low_mm = static_cast<int>(std::floor(d.*bound * 1e3));
+  auto high_mm = static_cast<int>(std::floor(kFurthest * d.*bound * 1e3));
+  const auto lasts_with = [&](int value_mm) {
+    d.*bound = 1e-3 * value_mm;
+    return lasts(d, kind);
+  };
+  if (!lasts_with(high_mm)) return std::nullopt;
+  while (high_mm - low_mm > 1) {
+    const int middle_mm = (low_mm + high_mm) / 2;
+    (lasts_with(middle_mm) ? high_mm : low_mm) = middle_mm;
+  }
+  return high_mm;
+}
+
+/// The options that make a spring last which does not; empty: none were found.
+std::string lasting_options(SpringDemand d, const SpringDesign& design,
+                            std::optional<SpringKind> kind) {
+  constexpr int kTries = 5;  // dimensions are rounded, so that the estimate can be too low
+  const double first = std::ceil(10.0 * d.safety / design.fatigue_margin) / 10.0;
+  std::string wider;
+  for (int n = 0; n < kTries; ++n) {
+    d.safety = first + 0.1 * n;
+    const std::string safety = fmt::format("--safety {:.3g}", d.safety);
+    if (lasts(d, kind)) return safety;
+    if (!wider.empty()) continue;
+    for (const auto& [option, bound] :
+         {std::pair{"--max-length", &SpringDemand::largest_length_m},
+          std::pair{"--max-diameter", &SpringDemand::largest_diameter_m}})
+      if (const auto found_mm = lasting_bound_mm(d, bound, kind))
+        wider +=
+            fmt::format("{}{} {} {:g}mm", wider.empty() ? "" : " or ", safety, option, *found_mm);
+  }
+  return wider;
+}
+
 }  // namespace
 
-void note_fatigue(DesignReport& report, const SpringDemand& d, const SpringDesign& design) {
+void note_fatigue(DesignReport& report, const SpringDemand& d, const SpringDesign& design,
+                  bool can_choose_kind) {
   if (!(design.fatigue_margin < 1.0)) return;
+  std::string options = lasting_options(d, design, std::nullopt);
+  if (options.empty() && can_choose_kind) {
+    options = lasting_options(d, design, design.kind);
+    if (!options.empty()) options += fmt::format(", with --kind {}", name_of(design.kind));
+  }
   report.notes.push_back(
-      fmt::format("The spring does not last under this torque in both directions: --safety {:.2g} "
-                  "makes it last.",
-                  std::ceil(10.0 * d.safety / design.fatigue_margin) / 10.0));
+      "The spring does not last under this torque in both directions: " +
+      (options.empty() ? fmt::format("neither --safety nor {:g} times the envelope makes it last; "
+                                     "take less torque, more angle or another material.",
+                                     kFurthest)
+                       : options + " makes it last."));
 }
 
 DesignReport spring_report(const SpringDemand& d, const SpringDesign& design,
@@ -105,7 +168,7 @@ DesignReport spring_report(const SpringDemand& d, const SpringDesign& design,
         {"resonance", resonance_Hz(d, design), "Hz",
          fmt::format("with a load of {:g} kg m2, rotor held", d.load_inertia_kg_m2)}}});
   report.pictures.emplace_back(torque_figure(d, design));
-  note_fatigue(report, d, design);
+  note_fatigue(report, d, design, true);
   const bool is_rod = design.kind == SpringKind::rod || design.kind == SpringKind::tube;
   if (is_rod && design.length_m < 2.0 * design.outer_m)
     report.notes.emplace_back(

@@ -130,5 +130,15 @@ TEST_F(DesignVerb, RefusesACallBeforeAnyFileIsWritten) {
   EXPECT_EQ(contents("a.json"), "");
 }
 
+TEST_F(DesignVerb, StatesTheReasonOfAnInfeasibleDesignOnce) {
+  const Outcome none = torsio(
+      "design spring --torque 120Nm --angle 6deg --max-diameter 20mm --max-length 120mm --safety "
+      "2");
+  expect_error(none, kWorkFailed, "the safety factor of 2 would have to move to 1.74");
+  EXPECT_EQ(none.err.find("  would"), std::string::npos) << none.err;
+  EXPECT_EQ(none.err.find(" ;"), std::string::npos) << none.err;
+  EXPECT_EQ(none.out.find("would have to move"), std::string::npos) << none.out;
+}
+
 }  // namespace
 }  // namespace torsio::test

@@ -29,6 +29,9 @@ struct ActuatorDemand {
   SpringDemand envelope = {};  ///< envelope, bore, material, safety, encoder of the spring
 };
 
+/// What the spring of such an actuator has to do.
+[[nodiscard]] SpringDemand spring_demand(const ActuatorDemand& demand);
+
 /// A requirement of a demand beside what a drive reaches.
 struct DriveLimit {
   std::string name;

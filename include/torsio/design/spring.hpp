@@ -87,8 +87,11 @@ struct SpringDesign {
 [[nodiscard]] DesignReport spring_report(const SpringDemand& demand, const SpringDesign& design,
                                          std::span<const SpringDesign> kinds = {});
 
-/// Adds a note with the safety factor that makes a spring last that does not.
-void note_fatigue(DesignReport& report, const SpringDemand& demand, const SpringDesign& design);
+/// Adds a note with the options that make a spring last which does not: a safety factor, and, where the
+/// stronger spring does not fit, the envelope that it needs. They were designed with.
+/// @param can_choose_kind whether the caller has an option --kind; else the lightest kind is designed
+void note_fatigue(DesignReport& report, const SpringDemand& demand, const SpringDesign& design,
+                  bool can_choose_kind);
 
 /// A data sheet for `torsio simulate` with this spring in the drive of the papers that is next in
 /// torque (assumed). @param name of the sheet
