@@ -23,6 +23,7 @@ struct LogColumn {
   std::vector<std::uint8_t> fresh = {};
   TimeKind time = TimeKind::none;
   std::string_view unit = {};  ///< suffix of a known unit that the file specifies besides the name
+  std::string unknown_unit = {};  ///< cell of a row of units that is none that torsio reads
 
   /// Whether name or file specify the unit.
   [[nodiscard]] bool has_unit() const noexcept;

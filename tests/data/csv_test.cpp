@@ -340,6 +340,19 @@ TEST(Csv, ARowOfUnitsIsRead) {
   EXPECT_EQ(table.line_of(0), 3U);
 }
 
+TEST(Csv, AnUnknownWordInARowOfUnitsIsRemarkedOn) {
+  const LogTable table = parse_csv("t;a;b;c;d;e\nms;Inc;grad;foo;-;foo\n0;1;5;2;3;4\n", "a.csv");
+  EXPECT_THAT(
+      table.notes,
+      testing::ElementsAre(
+          "line 2 is read as a row of units",
+          testing::StartsWith("the row of units has 'Inc' for a: counts have no size"),
+          "the row of units has 'foo' for c, e: not a unit that torsio reads; a mapping states it "
+          "(unit: ..)",
+          testing::StartsWith("the row of units has 'grad' for b: not read. It may be degrees")));
+  EXPECT_EQ(table.columns[1].unknown_unit, "Inc");
+}
+
 TEST(Csv, AHeaderThatIsRepeatedIsNotReadAgain) {
   const LogTable table = parse_csv("t,a\ns,Nm\n0,1\n1,2\n\"t\", a\ns,Nm\n0,3\nt,a\n1,4\n", "a.csv");
   ASSERT_EQ(table.columns.size(), 2U);

@@ -406,6 +406,72 @@ TEST(Mapping, ReadsUnitsAsPeopleWriteThem) {
   EXPECT_NEAR(converted("joint_speed_rad_s", "RPM"), 0.1047198, 1e-6);
 }
 
+TEST(Mapping, ReadsUnitsOfOtherLanguages) {
+  const auto converted = [](const std::string& channel, const std::string& unit) {
+    return read("t_s,x\n0,1\n1,1\n",
+                "channels: {" + channel + ": {from: x, unit: \"" + unit + "\"}}")[0]
+        .channel(channel)
+        .values[0];
+  };
+  for (const char* const deg : {"Grad", "[Grad]", "degrés", "grados", "gradi", "º", "Stopnie"})
+    EXPECT_NEAR(converted("joint_angle_rad", deg), 0.0174533, 1e-6) << deg;
+  for (const char* const rpm :
+       {"U/min", "Umdr/min", "tr/min", "giri/min", "obr/min", "min-1", "min⁻¹", "1/min", "min^-1"})
+    EXPECT_NEAR(converted("motor_speed_rad_s", rpm), 0.1047198, 1e-6) << rpm;
+  for (const char* const rate : {"Grad/s", "°/s", "grados/s"})
+    EXPECT_NEAR(converted("joint_speed_rad_s", rate), 0.0174533, 1e-6) << rate;
+  EXPECT_NEAR(converted("joint_angle_rad", "Umdrehungen"), 6.2831853, 1e-6);
+  EXPECT_EQ(converted("torque_Nm", "N⋅m"), 1.0);
+}
+
+TEST(Mapping, ProposesNoUnitOfAnotherSize) {
+  const auto refusal = [](const std::string& channel, const std::string& unit) {
+    return test::error_message([&] {
+      (void)read("t_s,x\n0,1\n1,1\n", "channels: {" + channel + ": {from: x, unit: " + unit + "}}");
+    });
+  };
+  // Gradians and degrees: the two lines of the answer are read.
+  const std::string grad = refusal("joint_angle_rad", "grad");
+  EXPECT_THAT(grad, testing::HasSubstr("unit: deg  or gon"));
+  EXPECT_THAT(grad, testing::HasSubstr("unit: rev, scale: 1/400"));
+  EXPECT_THAT(refusal("joint_angle_rad", "gon"), testing::HasSubstr("scale: 1/400"));
+  EXPECT_NEAR(read("t_s,x\n0,100\n1,1\n",
+                   "channels: {joint_angle_rad: {from: x, unit: rev, scale: 1/400}}")[0]
+                  .channel("joint_angle_rad")
+                  .values[0],
+              1.5707963, 1e-6);
+  for (const char* const unit : {"Gard", "dag", "mrd", "radd", "MRAD"}) {
+    const std::string message = refusal("joint_angle_rad", unit);
+    EXPECT_THAT(message, testing::Not(testing::HasSubstr("Did you mean"))) << unit;
+    EXPECT_THAT(message, testing::HasSubstr("Units of rad: rad, mrad, urad, deg, rev")) << unit;
+  }
+  EXPECT_THAT(refusal("torque_Nm", "MNM"), testing::Not(testing::HasSubstr("Did you mean")));
+  EXPECT_THAT(refusal("torque_Nm", "mnm"), testing::HasSubstr("Did you mean 'mNm'?"));
+  for (const char* const counts : {"Inc", "Ink", "Ink.", "Inkremente", "Impulse", "counts"})
+    EXPECT_THAT(refusal("gear_angle_rad", counts), testing::HasSubstr("scale: 1/COUNTS")) << counts;
+}
+
+TEST(Mapping, StatesWhatToWriteForAWordOfADraftThatWasLeft) {
+  const auto refusal = [](const std::string& rest) {
+    return test::error_message([&] {
+      (void)read("t_s,x\n0,1\n1,1\n",
+                 "channels: {gear_angle_rad: {from: x, unit: rev, " + rest + "}}");
+    });
+  };
+  EXPECT_THAT(refusal("scale: 1/COUNTS, gear_ratio: 80"),
+              testing::AllOf(testing::HasSubstr("channels.gear_angle_rad.scale"),
+                             testing::HasSubstr("found '1/COUNTS'"),
+                             testing::HasSubstr("Write the counts of one turn of the encoder")));
+  EXPECT_THAT(refusal("scale: FACTOR"), testing::HasSubstr("scale: 0.001"));
+  EXPECT_THAT(refusal("scale: 1/4096, gear_ratio: N"), testing::HasSubstr("gear_ratio: 80"));
+  EXPECT_NEAR(
+      read("t_s,x\n0,4096\n1,1\n",
+           "channels: {gear_angle_rad: {from: x, unit: rev, scale: 1/4096, gear_ratio: 80}}")[0]
+          .channel("gear_angle_rad")
+          .values[0],
+      6.2831853 / 80.0, 1e-9);
+}
+
 TEST(Mapping, AnswersUnitsThatItDoesNotReadBeforeItListsTheOthers) {
   const auto refusal = [](const std::string& channel, const std::string& unit) {
     return test::error_message([&] {

@@ -40,6 +40,10 @@ bool is_nameless(std::string_view name) {
          std::ranges::all_of(name, [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
+bool has_letter(std::string_view cell) {
+  return std::ranges::any_of(cell, [](unsigned char c) { return std::isalpha(c) != 0; });
+}
+
 bool is_among(const std::vector<std::string>& names, std::string_view name) {
   return std::ranges::find(names, name) != names.end();
 }
@@ -64,7 +68,10 @@ class TableParser {
         unit = in_brackets->unit;
         if (column_in_brackets_.empty()) column_in_brackets_ = columns_.back().name;
       }
-      if (unit != nullptr) columns_.back().unit = unit->suffix;
+      if (unit != nullptr)
+        columns_.back().unit = unit->suffix;
+      else if (has_letter(unit_cell))
+        columns_.back().unknown_unit = without_frame(unit_cell);
     }
     for (const std::string& mark : options.rules.missing) {
       const char* at = mark.c_str();
@@ -133,6 +140,7 @@ class TableParser {
       table_.notes.push_back(fmt::format("marks between thousands are read, for example in '{}'",
                                          printable(with_thousands_marks_)));
     finish_times();
+    note_unknown_units();
     std::vector<std::string> left_out;
     std::vector<std::string> nameless;
     for (std::size_t i = 0; i < columns_.size(); ++i) {
@@ -175,6 +183,21 @@ class TableParser {
     bool is_complete = false;  ///< numbers for what was not measured are numbers here
     std::size_t time_stamps = 0;
   };
+
+  /// Columns of numbers alone: below a date there may be its format.
+  void note_unknown_units() {
+    constexpr std::size_t kMaxWords = 8;
+    constexpr std::size_t kMaxNamed = 4;
+    std::map<std::string_view, std::vector<std::string>> columns_by_word;
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      if (const LogColumn& column = columns_[i];
+          state_[i].is_read && column.time == TimeKind::none && !column.unknown_unit.empty() &&
+          columns_by_word.size() < kMaxWords)
+        columns_by_word[column.unknown_unit].push_back(printable(column.name));
+    for (const auto& [word, names] : columns_by_word)
+      table_.notes.push_back(fmt::format("the row of units has '{}' for {}: {}", printable(word),
+                                         listed(names, kMaxNamed), note_on_unknown_unit(word)));
+  }
 
   /// Whether it is the clock, a time, a mask, or a column that the mapping uses as one of them.
   [[nodiscard]] bool is_complete(const LogColumn& column) const {

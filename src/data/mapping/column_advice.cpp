@@ -7,9 +7,9 @@
 #include <cctype>
 #include <vector>
 
-#include "core/did_you_mean.hpp"
 #include "core/lower.hpp"
 #include "core/trimmed.hpp"
+#include "data/mapping/unit_words.hpp"
 #include "data/names.hpp"
 #include "data/yaml_reader.hpp"
 #include "torsio/core/units.hpp"
@@ -21,19 +21,6 @@ struct Word {
   std::string_view word;
   std::string_view meaning;
 };
-
-/// Units as loggers spell them.
-constexpr auto kSpellings = std::to_array<Word>({
-    {"radians", "rad"},     {"radian", "rad"},     {"rad", "rad"},         {"degrees", "deg"},
-    {"degree", "deg"},      {"deg", "deg"},        {"turns", "rev"},       {"turn", "rev"},
-    {"revolutions", "rev"}, {"seconds", "s"},      {"second", "s"},        {"sec", "s"},
-    {"msec", "ms"},         {"usec", "us"},        {"rad/sec", "rad_s"},   {"deg/sec", "deg_s"},
-    {"deg/s", "deg_s"},     {"turns/s", "rev_s"},  {"rpm", "rpm"},         {"rev/min", "rpm"},
-    {"1/min", "rpm"},       {"u/min", "rpm"},      {"amps", "A"},          {"amp", "A"},
-    {"ampere", "A"},        {"volts", "V"},        {"volt", "V"},          {"nm", "Nm"},
-    {"n-m", "Nm"},          {"newtonmeter", "Nm"}, {"newtonmeters", "Nm"}, {"hz", "Hz"},
-    {"celsius", "degC"},    {"lbfft", "lbft"},     {"ftlb", "lbft"},
-});
 
 /// Quantities and the SI unit that they are kept in.
 constexpr auto kQuantities = std::to_array<Word>({
@@ -58,8 +45,7 @@ constexpr auto kQuantities = std::to_array<Word>({
 /// The known unit that is meant, or nothing.
 std::string_view unit_meant(std::string_view text) {
   if (const Unit* unit = find_unit(text)) return unit->suffix;
-  const auto* const at = std::ranges::find(kSpellings, lower(text), &Word::word);
-  return at == kSpellings.end() ? std::string_view() : at->meaning;
+  return is_gradian_or_degree(text) ? std::string_view() : unit_spelled(text);
 }
 
 /// The SI unit of what the name speaks of, or nothing.
@@ -93,15 +79,6 @@ std::string rule_line(std::string_view quantity, std::string_view unit, std::str
                      yaml_name(column), rest);
 }
 
-/// Numbers of a converter or an encoder, whose size only the user can state.
-bool is_count(std::string_view unit) {
-  constexpr auto kCounts = std::to_array<std::string_view>(
-      {"count", "counts",    "cnt",        "cnts", "tick",  "ticks", "inc",
-       "incs",  "increment", "increments", "lsb",  "raw",   "digit", "digits",
-       "bit",   "bits",      "adc",        "cpr",  "pulse", "pulses"});
-  return std::ranges::find(kCounts, lower(unit)) != kCounts.end();
-}
-
 /// "Torque [Nm]", "Winkel (deg)", "Winkel °": the name and the unit in brackets at its end, or a sign of degrees there.
 std::pair<std::string_view, std::string_view> without_brackets(std::string_view name) {
   for (const std::string_view sign : {"\xc2\xb0", "\xc2\xb0/s"})
@@ -115,15 +92,6 @@ std::pair<std::string_view, std::string_view> without_brackets(std::string_view 
   return {trimmed(name.substr(0, open)), name.substr(open + 1, name.size() - open - 2)};
 }
 
-/// Without brackets around it.
-std::string_view without_frame(std::string_view text) {
-  text = trimmed(text);
-  if (text.size() >= 2 &&
-      ((text.front() == '[' && text.back() == ']') || (text.front() == '(' && text.back() == ')')))
-    text = trimmed(text.substr(1, text.size() - 2));
-  return text;
-}
-
 }  // namespace
 
 std::string yaml_name(std::string_view text) {
@@ -131,33 +99,6 @@ std::string yaml_name(std::string_view text) {
       !text.empty() && std::isdigit(static_cast<unsigned char>(text.front())) == 0 &&
       std::ranges::all_of(text, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
   return is_plain ? std::string(text) : yaml_quoted(escaped(text));
-}
-
-const Unit* unit_in_words(std::string_view written) {
-  std::string_view text = without_frame(written);
-  if (text.size() > 1 && text.front() == '_') text.remove_prefix(1);  // as names end: "_1"
-  if (const Unit* const unit = find_written_unit(text)) return unit;
-  std::string plain;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    constexpr std::string_view kDegree = "\xc2\xb0";
-    constexpr std::string_view kDot = "\xc2\xb7";
-    constexpr std::string_view kMicro = "\xc2\xb5";
-    const std::string_view rest = text.substr(i);
-    const bool is_special =
-        rest.starts_with(kDegree) || rest.starts_with(kDot) || rest.starts_with(kMicro);
-    if (rest.starts_with(kDegree)) plain += "deg";
-    if (rest.starts_with(kMicro)) plain += 'u';
-    if (is_special)
-      ++i;
-    else if (text[i] == '%')
-      plain += "pct";
-    else if (text[i] != ' ' && text[i] != '*' && text[i] != '.')
-      plain += text[i];
-  }
-  if (const Unit* const unit = find_written_unit(plain)) return unit;
-  if (plain == "nm") return nullptr;  // nanometres, too
-  const auto* const at = std::ranges::find(kSpellings, lower(plain), &Word::word);
-  return at == kSpellings.end() ? nullptr : find_unit(at->meaning);
 }
 
 std::optional<NameInBrackets> unit_in_brackets(std::string_view name) {
@@ -193,6 +134,9 @@ std::pair<std::string_view, std::string_view> name_and_unit(std::string_view col
 
 Proposal proposal_for(std::string_view column) {
   const auto [quantity, unit] = name_and_unit(column);
+  if (is_gradian_or_degree(unit))
+    return {"If these are degrees and not gradians (unit: rev, scale: 1/400), write in a mapping",
+            rule_line(quantity, "rad", column, "unit: deg")};
   if (is_count(unit))
     return {fmt::format("{} have no size of their own; with COUNTS of them in a revolution, write "
                         "in a mapping",
@@ -223,7 +167,8 @@ std::string advice_without_unit(std::string_view column) {
 }
 
 std::string advice_on_written_unit(std::string_view written, std::string_view si_unit) {
-  if (is_count(without_frame(written)))
+  const std::string_view text = without_frame(written);
+  if (is_count(text))
     return si_unit == "rad"
                ? "Counts have no size of their own: with COUNTS of them in a revolution, write  "
                  "unit: rev, scale: 1/COUNTS"
@@ -231,19 +176,29 @@ std::string advice_on_written_unit(std::string_view written, std::string_view si
                      "Counts have no size of their own: write  unit: {}, scale: FACTOR  "
                      "with the {} of one count",
                      si_unit, si_unit == "1" ? "value" : si_unit);
-  std::vector<std::string_view> names;  // those that fit: 'ns' is not meant by 'nm'
-  for (const Unit& unit : known_units())
-    if (unit.si_suffix == si_unit) names.push_back(unit.suffix);
-  const std::string_view text = without_frame(written);
-  const auto* const same = std::ranges::find(kSpellings, lower(text), &Word::word);
-  const std::string nearest = same != kSpellings.end()
-                                  ? fmt::format("Did you mean '{}'?", same->meaning)
-                                  : did_you_mean(text, names);
-  return (nearest.empty() ? "" : nearest + " ") +
+  if (is_gradian_or_degree(text) || is_gradian(text)) return std::string(kAdviceOnGradians);
+  std::vector<std::string> fitting;
+  std::string same;  // a proposal with another prefix would be another size: 'MNm' is not 'mNm'
+  for (const Unit& unit : known_units()) {
+    if (unit.si_suffix != si_unit) continue;
+    fitting.emplace_back(unit.suffix);
+    if (lower(text) == lower(unit.suffix) && (text.front() == unit.suffix.front()))
+      same = unit.suffix;
+  }
+  if (const std::string_view spelled = unit_spelled(text); !spelled.empty()) same = spelled;
+  return (same.empty() ? "" : fmt::format("Did you mean '{}'? ", same)) +
          fmt::format(
-             "Another unit is read as  unit: {0}, scale: FACTOR  with the {0} of one of "
-             "it.\n  Known units: {1}",
-             si_unit, known_unit_list());
+             "Units of {0}: {1}. Another unit is read as  unit: {0}, scale: FACTOR  with the {0} "
+             "of one of it.\n  Known units: {2}",
+             si_unit, joined(fitting), known_unit_list());
+}
+
+std::string note_on_unknown_unit(std::string_view written) {
+  if (is_count(written))
+    return "counts have no size of their own; a mapping states it (unit: rev, scale: 1/COUNTS)";
+  if (is_gradian_or_degree(written) || is_gradian(written))
+    return fmt::format("not read. {}", kAdviceOnGradians);
+  return "not a unit that torsio reads; a mapping states it (unit: ..)";
 }
 
 }  // namespace torsio

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "data/mapping/unit_words.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -20,11 +21,11 @@ namespace torsio {
 [[nodiscard]] std::string advice_on_written_unit(std::string_view written,
                                                  std::string_view si_unit);
 
+/// What a text in a row of units that is not a known unit means for the user, in one line.
+[[nodiscard]] std::string note_on_unknown_unit(std::string_view written);
+
 /// A text of a mapping, in quotes if it needs them.
 [[nodiscard]] std::string yaml_name(std::string_view text);
-
-/// A unit as people and loggers spell it: "[deg/s]", "seconds", "°", "N·m"; null if it is not known.
-[[nodiscard]] const Unit* unit_in_words(std::string_view written);
 
 /// A name that ends in a unit in brackets.
 struct NameInBrackets {

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "core/trimmed.hpp"
 #include "data/mapping/column_advice.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/ready_mappings.hpp"
@@ -22,6 +23,16 @@ std::string written_unit(const YamlValue& yaml) {
   const std::vector<std::string> texts = yaml.texts();
   if (texts.size() != 1) yaml.refuse("one unit, such as deg");
   return texts.front();
+}
+
+/// A word of a draft that only the user can replace.
+void refuse_placeholder(const YamlValue& yaml, std::string_view word, const std::string& advice) {
+  if (!yaml.is_scalar()) return;
+  const std::string text = yaml.text();
+  const std::size_t slash = text.find('/');
+  if (trimmed(text) == word ||
+      (slash != std::string::npos && trimmed(std::string_view(text).substr(slash + 1)) == word))
+    yaml.refuse("a number", advice);
 }
 
 ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
@@ -47,10 +58,19 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
     if (std::abs(rule.sign) != 1.0) sign->refuse("1 or -1", "Use scale for other factors.");
   }
   if (const auto scale = yaml.find("scale")) {
+    refuse_placeholder(*scale, "COUNTS",
+                       "Write the counts of one turn of the encoder in the place of COUNTS, such "
+                       "as  scale: 1/4096");
+    refuse_placeholder(
+        *scale, "FACTOR",
+        "Write how much one of the column's numbers is in the unit of unit:, such as "
+        " scale: 0.001");
     rule.scale = scale->factor();
     if (rule.scale == 0.0) scale->refuse("a number other than 0");
   }
   if (const auto ratio = yaml.find("gear_ratio")) {
+    refuse_placeholder(*ratio, "N",
+                       "Write the gear ratio in the place of N, such as  gear_ratio: 80");
     rule.gear_ratio = ratio->factor();
     if (!(rule.gear_ratio > 0.0)) ratio->refuse("a positive number, like 150");
     if (!gear_scale(split_channel_name(si_name)->unit->si_suffix, rule.gear_ratio))
