@@ -127,7 +127,7 @@ std::string inputs_text(const std::vector<CInput>& inputs, const C99Options& opt
       has_number = true;
       continue;
     }
-    text += fmt::format("\n   {}: its encoder has {:g} counts in a turn{}.", input.channel,
+    text += fmt::format("\n   {}: {} counts in a turn of the joint{}.", input.channel,
                         std::abs(counts->counts_per_turn),
                         counts->counts_per_turn < 0.0 ? ", which rise where the angle falls" : "");
   }

@@ -119,8 +119,10 @@ void add_export(CLI::App& app) {
       "--counts joint_angle_rad=524288 -o firmware\n"
       "         torsio export joint.safetensors --onnx -o joint.onnx\n"
       "--c99 writes firmware/joint.h and firmware/joint.c: C99 without a library or a heap. "
-      "Compiled "
-      "with -DJOINT_SELF_TEST it compares itself with torsio. A float does not resolve the "
+      "Compiled with -DJOINT_SELF_TEST (the name in capitals) joint.c has joint_self_test(), to be "
+      "called once on each new target: it returns the largest difference from torsio's own "
+      "values, which joint.c contains, as a share of the torque's range: at most 1e-4 in float and "
+      "1e-6 in double, 1000 if a fault differs. A float does not resolve the "
       "difference of two angles: give angles as counts of their encoders.\n"
       "docs/robot/embedded.md and docs/robot/simulators.md state what each target contains and "
       "what is lost.");
@@ -131,9 +133,11 @@ void add_export(CLI::App& app) {
       "--real", flags->real,
       "type of its numbers: float, double or, for --onnx and --warp, mixed, which has 64 bits for "
       "inputs and features only (default: --c99 float, --warp mixed, others double)");
-  verb->add_option("--counts", flags->counts,
-                   "CHANNEL=COUNTS: this angle is given as counts of an encoder with so many in a "
-                   "turn; negative if the angle falls where they rise");
+  verb->add_option(
+      "--counts", flags->counts,
+      "CHANNEL=COUNTS: this angle is given as counts of an encoder, with so many in a turn "
+      "of the joint: those of an encoder before the gear times its ratio; negative if "
+      "the angle falls where they rise; auto: those of the model's mapping");
   verb->add_option(
       "--controller", flags->controller,
       "FILE.yaml of torsio tune-loop: add the controller of the joint, with the model as "

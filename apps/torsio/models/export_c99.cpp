@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,6 +19,7 @@
 #include "models/export_flags.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/data/mapping.hpp"
 #include "torsio/export/c99.hpp"
 #include "torsio/export/c_cost.hpp"
 #include "torsio/files/model_file.hpp"
@@ -25,16 +27,67 @@
 
 namespace {
 
-/// "gear_angle_rad=524288"
-torsio::CCounts counts_of(const std::string& text) {
+/// The counts in a turn of the joint with which a mapping reads the column of an angle.
+struct MappedCounts {
+  double counts_per_turn = 0.0;
+  std::string text;  ///< the rule in words: "1310720 (16384 in a turn before a gear of 80)"
+};
+
+/// None if the model has no mapping with this channel, or its column has no counts: a rule without `scale`.
+std::optional<MappedCounts> mapped_counts(const torsio::ModelFile& model,
+                                          const std::string& channel) {
+  if (model.card.mapping.empty()) return std::nullopt;
+  const torsio::Mapping mapping = torsio::parse_mapping(model.card.mapping, "mapping of the model");
+  const auto rule = std::ranges::find(mapping.channels, channel, &torsio::ChannelRule::name);
+  if (rule == mapping.channels.end() || rule->scale == 1.0) return std::nullopt;
+  const torsio::Unit* const unit = torsio::find_unit(rule->unit.empty() ? "rad" : rule->unit);
+  if (unit == nullptr || unit->si_suffix != "rad") return std::nullopt;
+  const double of_encoder = 2.0 * std::numbers::pi / (rule->sign * rule->scale * unit->scale);
+  constexpr double kRounded = 1e-6;  // The mapping has a limited number of digits.
+  const double counts = std::round(of_encoder * rule->gear_ratio);
+  if (!(std::abs(of_encoder * rule->gear_ratio - counts) < kRounded * std::abs(counts)))
+    return std::nullopt;
+  std::string text = fmt::format("{}", counts);
+  if (rule->gear_ratio != 1.0)
+    text += fmt::format(" ({:.9g} in a turn of the encoder, {:g} turns of it in one of the joint)",
+                        of_encoder, rule->gear_ratio);
+  return MappedCounts{counts, std::move(text)};
+}
+
+/// "gear_angle_rad=524288", or "gear_angle_rad=auto" for the counts of the model's mapping
+torsio::CCounts counts_of(const std::string& text, const torsio::ModelFile& model) {
   const auto equals = text.find('=');
   if (equals == std::string::npos)
-    throw torsio::UsageError({.place = "--counts",
-                              .expected = "CHANNEL=COUNTS_PER_TURN, such as gear_angle_rad=524288",
-                              .found = text});
-  return {.channel = text.substr(0, equals),
-          .counts_per_turn =
-              torsio::signed_quantity_with_unit(text.substr(equals + 1), "1", "--counts")};
+    throw torsio::UsageError(
+        {.place = "--counts",
+         .expected = "CHANNEL=COUNTS in a turn of the joint, such as gear_angle_rad=524288, or "
+                     "gear_angle_rad=auto",
+         .found = text});
+  const std::string channel = text.substr(0, equals);
+  const auto mapped = mapped_counts(model, channel);
+  if (text.substr(equals + 1) == "auto") {
+    if (!mapped)
+      throw torsio::UsageError(
+          {.place = "--counts",
+           .expected = fmt::format("a model whose mapping reads counts for {}", channel),
+           .found = model.card.mapping.empty() ? "a model without a mapping"
+                                               : "a mapping without such a channel and its scale",
+           .advice = fmt::format("Give the number: --counts {}=COUNTS, those in a turn of the "
+                                 "joint.",
+                                 channel)});
+    return {.channel = channel, .counts_per_turn = mapped->counts_per_turn};
+  }
+  const double counts = torsio::signed_quantity_with_unit(text.substr(equals + 1), "1", "--counts");
+  constexpr double kSame = 1e-6;
+  if (mapped &&
+      !(std::abs(counts - mapped->counts_per_turn) <= kSame * std::abs(mapped->counts_per_turn)))
+    remark(fmt::format(
+        "warning: --counts {0}={1}, but the recordings that the model was trained with had {2} in "
+        "a "
+        "turn of the joint: if it is the same encoder, the torque will be wrong; take --counts "
+        "{0}=auto",
+        channel, counts, mapped->text));
+  return {.channel = channel, .counts_per_turn = counts};
 }
 
 /// A number with an ending that scales it: "256kB", "168MHz". @param unit without an ending
@@ -177,7 +230,6 @@ void export_c99(ExportFlags& flags) {
   const std::string source = (folder / (flags.c99 + ".c")).string();
   const torsio::CReal real = real_of(flags, torsio::CReal::single);
   torsio::C99Options options{.name = flags.c99, .real = real};
-  for (const std::string& each : flags.counts) options.counts.push_back(counts_of(each));
   if (!flags.controller.empty()) options.controller = torsio::read_controller(flags.controller);
   std::vector<const torsio::CTarget*> targets;
   if (!flags.target.empty())
@@ -194,6 +246,7 @@ void export_c99(ExportFlags& flags) {
                               .problem = "--flash, --ram and --clock are those of one target",
                               .advice = "Name it with --target."});
   const torsio::ModelFile model = torsio::load_model(flags.model);
+  for (const std::string& each : flags.counts) options.counts.push_back(counts_of(each, model));
   const torsio::C99Program program =
       torsio::c99_program(model, options, std::filesystem::path(flags.model).filename().string());
   if (!flags.target.empty()) {
