@@ -39,6 +39,20 @@ Json report_json(const FitReport& report) {
           {"parameters", std::move(parameters)}};
 }
 
+/// The way out where the residuals follow an input that is filtered: what the filter removes is missing.
+std::string advice_on_filters(const std::vector<std::string>& with) {
+  for (const std::string& each : with) {
+    const std::size_t comma = each.rfind(", ");
+    if (!each.starts_with("lowpass(") || comma == std::string::npos) continue;
+    const std::string cutoff = each.substr(comma + 2, each.size() - comma - 3);
+    return fmt::format(
+        ", as could inputs that are filtered less: {} leaves out what is faster than {} (--inputs "
+        "with a higher cut-off)",
+        each, cutoff);
+  }
+  return {};
+}
+
 /// The result of the correlations in one sentence. With fewer than `kEnough` effective samples a
 /// correlation with an input has to exceed 0.47 to be significant (99 %), so that small ones prove
 /// nothing and the residuals are not called white.
@@ -61,9 +75,9 @@ std::string verdict(const FitReport& report) {
   std::string text;
   if (!with.empty())
     text = fmt::format(
-        "the residuals are correlated with {}: another model could reduce them{} "
+        "the residuals are correlated with {}: another model could reduce them{}{} "
         "(docs/use/fit_report.md)\n",
-        fmt::join(with, ", "),
+        fmt::join(with, ", "), advice_on_filters(with),
         report.table.empty() ? "" : "; the standard errors below account for it");
   if (!is_enough)
     text += fmt::format(

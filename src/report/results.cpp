@@ -177,7 +177,8 @@ std::string note_on_samples(const Ranking& ranking) {
         "training data.\n",
         100.0 * guarded, 100.0 * (1.0 - guarded));
   return fmt::format(
-      "errors on {} of {} samples; in the others a guard reported a fault of a model\n",
+      "errors on {} of the {} samples at which the sensor gave a new value; in the others a guard "
+      "reported a fault of a model\n",
       ranking.common_samples, ranking.scored_samples);
 }
 

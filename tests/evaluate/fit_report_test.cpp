@@ -106,6 +106,24 @@ TEST(FitReportOf, ItsTextAndDocumentHaveWhatWasFound) {
   EXPECT_NE(document.find("\"a note\""), std::string::npos);
 }
 
+TEST(FitReportOf, NamesTheFilterOfAnInputThatTheResidualsFollow) {
+  FitReport report{.split = "train",
+                   .samples = 10000,
+                   .correlations = {{.with = "residual", .strongest = 1.0, .share_outside = 1.0},
+                                    {.with = "lowpass(joint_speed_rad_s, 10Hz)",
+                                     .strongest = 0.6,
+                                     .share_outside = 1.0}},
+                   .table = {}};
+  report.effective_samples = 5000.0;
+  EXPECT_NE(fit_report_text(report).find(
+                "another model could reduce them, as could inputs that are filtered less: "
+                "lowpass(joint_speed_rad_s, 10Hz) leaves out what is faster than 10Hz"),
+            std::string::npos)
+      << fit_report_text(report);
+  report.correlations[1].with = "joint_speed_rad_s";
+  EXPECT_EQ(fit_report_text(report).find("filtered less"), std::string::npos);
+}
+
 TEST(FitReportOf, FewIndependentSamplesAreNoReasonToCallResidualsWhite) {
   FitReport report{.split = "train",
                    .samples = 10000,

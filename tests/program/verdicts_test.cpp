@@ -99,6 +99,22 @@ TEST_F(Verdicts, WarnOfMotionOfAnotherKind) {
             std::string::npos);
 }
 
+TEST_F(Verdicts, DoNotWarnOfAMotionBetweenTwoOfTheTrainingAndHaveTheWarningOnThePage) {
+  const std::string triangles = "elastomer triangles --duration 30s --amplitude ";
+  simulate(triangles + "2Nm --frequency 0.4Hz -o slow.csv");
+  simulate(triangles + "2Nm --frequency 4Hz --seed 2 -o fast.csv");
+  simulate(triangles + "2Nm --frequency 1.26Hz --seed 3 -o between.csv");
+  simulate(triangles + "0.2Nm --frequency 1.26Hz --seed 4 -o small.csv");
+  const std::string call = "compare slow.csv fast.csv --models linear --report page.html --test ";
+  const Outcome between = torsio(call + "between.csv");
+  ASSERT_EQ(between.exit_code, 0) << between.err;
+  EXPECT_EQ(between.err.find("in another way"), std::string::npos) << between.err;
+  EXPECT_EQ(contents("page.html").find("in another way"), std::string::npos);
+  expect_in(torsio("compare slow.csv --models linear --test between.csv").err, "in another way");
+  expect_in(torsio(call + "small.csv").err, "warning: small moves");
+  EXPECT_NE(contents("page.html").find("in another way"), std::string::npos);
+}
+
 TEST_F(Verdicts, SuggestTheChannelThatIsMeant) {
   simulate("dfki-50 sweep --duration 40s -o a.csv");
   const auto suggests = [this](const std::string& call, const std::string& channel) {

@@ -8,6 +8,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/families.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio {
 namespace {
@@ -47,6 +48,29 @@ TEST(ResultsJson, HasTheFieldsOfTheContract) {
                               "status",
                               "reason"})
       EXPECT_TRUE(row.contains(field)) << field;
+}
+
+TEST(RankingNote, StatesOfWhichSamplesErrorsAre) {
+  EXPECT_EQ(
+      ranking_note({.scored_samples = 11972, .common_samples = 11958}),
+      "errors on 11958 of the 11972 samples at which the sensor gave a new value; in the others "
+      "a guard reported a fault of a model\n");
+}
+
+TEST(ComparisonReport, NamesTheLargestErrorWithAndWithoutTheSamplesOfGuards) {
+  const Dataset dataset = test::bench_dataset();
+  Comparison comparison = compare(dataset, model_choices(dataset, "linear", {}), 1, false);
+  const auto summary = [&] { return comparison_report(comparison, dataset).summary.front(); };
+  EXPECT_EQ(summary().find("that a guard reported"), std::string::npos) << summary();
+  for (ResultRow& row : comparison.results.rows)
+    if (row.split == Role::test) {
+      row.score.common.max_abs = 2.5;
+      row.score.metrics.max_abs = 99.0;
+    }
+  EXPECT_NE(
+      summary().find("largest error 2.500 Nm (99.000 Nm with the samples that a guard reported)."),
+      std::string::npos)
+      << summary();
 }
 
 TEST(ResultsJson, WritesWhatIsNotANumberAsNull) {

@@ -84,13 +84,49 @@ void warn_of_failed_checks(const torsio::Dataset& dataset, const torsio::Feature
   warn_of_failed_checks(torsio::check_for_fit(dataset, features, true));
 }
 
+namespace {
+
+/// Whether each quantity of a motion is within the range of the training recordings, widened by what
+/// two motions of one kind differ by: such a recording lies between others.
+bool is_between(const torsio::Motion& motion, const std::vector<torsio::Motion>& trained) {
+  const auto within = [&](double torsio::Motion::*quantity) {
+    const auto [low, high] = std::ranges::minmax(trained, {}, quantity);
+    return motion.*quantity >= low.*quantity / torsio::kMotionRatio &&
+           motion.*quantity <= high.*quantity * torsio::kMotionRatio;
+  };
+  const auto [least, greatest] = std::ranges::minmax(trained, {}, &torsio::Motion::rest_share);
+  return within(&torsio::Motion::amplitude) && within(&torsio::Motion::rms_speed) &&
+         within(&torsio::Motion::frequency_Hz) &&
+         motion.rest_share >= least.rest_share - torsio::kRestDifference &&
+         motion.rest_share <= greatest.rest_share + torsio::kRestDifference;
+}
+
+}  // namespace
+
+std::vector<std::string> other_motion_warnings(const torsio::Dataset& dataset,
+                                               const torsio::FeatureSpec& features,
+                                               const std::string& place) {
+  std::vector<std::string> warnings;
+  const auto others = torsio::other_motions(dataset, features);
+  if (others.empty()) return warnings;
+  std::vector<torsio::Motion> trained;
+  for (const torsio::DatasetRecord& record : dataset.records)
+    if (const auto motion = torsio::motion_of(record, torsio::Role::train, features);
+        motion.rms_speed > 0.0)
+      trained.push_back(motion);
+  for (const torsio::OtherMotion& other : others)
+    if (!is_between(other.held_out, trained))
+      warnings.push_back(fmt::format(
+          "{}{} moves {} in another way than every training recording, with {} of {}: "
+          "its errors and error bars are those of another kind of motion",
+          place, other.recording, features.inputs.front(), other.text(), other.nearest));
+  return warnings;
+}
+
 void warn_of_other_motions(const torsio::Dataset& dataset, const torsio::FeatureSpec& features,
                            const std::string& place) {
-  for (const torsio::OtherMotion& other : torsio::other_motions(dataset, features))
-    remark(
-        fmt::format("warning: {}{} moves {} in another way than every training recording, with "
-                    "{} of {}: its errors and error bars are those of another kind of motion",
-                    place, other.recording, features.inputs.front(), other.text(), other.nearest));
+  for (const std::string& warning : other_motion_warnings(dataset, features, place))
+    remark("warning: " + warning);
 }
 
 void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/check/check.hpp"
@@ -11,9 +12,13 @@
 /// Repeats what `torsio check` reports as FAIL about these recordings, one line each.
 void warn_of_failed_checks(const torsio::FitCheck& check);
 void warn_of_failed_checks(const torsio::Dataset& dataset, const torsio::FeatureSpec& features);
-/// Warns of held-out recordings whose motion is of another kind than that of every training
-/// recording (`other_motions`).
+/// Warnings of held-out recordings whose motion is of another kind than that of every training
+/// recording (`other_motions`), and does not lie between them.
 /// @param place the fold that holds them out, "fold 2: "; may be empty
+[[nodiscard]] std::vector<std::string> other_motion_warnings(const torsio::Dataset& dataset,
+                                                             const torsio::FeatureSpec& features,
+                                                             const std::string& place = {});
+/// Prints them.
 void warn_of_other_motions(const torsio::Dataset& dataset, const torsio::FeatureSpec& features,
                            const std::string& place = {});
 /// Warns of recordings that the model was trained on: a score on them is not a held-out score.

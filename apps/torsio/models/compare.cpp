@@ -1,6 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "common/data_flags.hpp"
 #include "common/model_doubts.hpp"
@@ -41,7 +45,8 @@ void run(CompareFlags& flags) {
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   flags.data.compute_target(dataset, features);
   warn_of_failed_checks(dataset, features);
-  warn_of_other_motions(dataset, features);
+  const std::vector<std::string> other_motions = other_motion_warnings(dataset, features);
+  for (const std::string& warning : other_motions) remark("warning: " + warning);
   std::optional<torsio::StructureSearch> search;
   if (flags.models == torsio::kSearch) {
     torsio::require_test_recordings(dataset);  // before the search, which may take hours
@@ -61,7 +66,7 @@ void run(CompareFlags& flags) {
   const auto choices =
       search ? search->winners
              : torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
-  const auto comparison =
+  auto comparison =
       torsio::compare(dataset, choices, flags.seed, flags.allow_leak, progress.listener());
   flags.json.write(search ? torsio::search_json(comparison.results, search->scores)
                           : torsio::results_json(comparison.results));
@@ -71,6 +76,7 @@ void run(CompareFlags& flags) {
         !flags.json.wants_tables() && !note.empty())
       remark(std::string(torsio::name(ranking.split)) + ": " + note);
   for (const std::string& warning : comparison.results.warnings) remark("warning: " + warning);
+  std::ranges::copy(other_motions, std::back_inserter(comparison.results.warnings));
   if (has_all(flags.models))
     remark(
         fmt::format("note: all leaves out {} families, which --help lists: add them by name, as in "

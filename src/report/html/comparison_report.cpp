@@ -20,8 +20,20 @@ Role last_role(const Results& results) {
   return has_test ? Role::test : Role::validation;
 }
 
-double ranked_error(const ResultRow& row) {
-  return row.score.common.samples > 0 ? row.score.common.rmse : row.score.metrics.rmse;
+/// On the samples without those of guards, where there is a ranking, as in the table.
+const Metrics& ranked_metrics(const ResultRow& row) {
+  return row.score.common.samples > 0 ? row.score.common : row.score.metrics;
+}
+double ranked_error(const ResultRow& row) { return ranked_metrics(row).rmse; }
+
+/// The largest error of the table, and that with the samples of guards where it is larger.
+std::string largest_error_text(const ResultRow& row, const std::string& unit) {
+  const double ranked = ranked_metrics(row).max_abs;
+  const double all = row.score.metrics.max_abs;
+  std::string text = fmt::format("{} {}", error_text(ranked), unit);
+  if (all > ranked)
+    text += fmt::format(" ({} {} with the samples that a guard reported)", error_text(all), unit);
+  return text;
 }
 
 /// What the row of a table opens: settings, remarks and the scores on each recording.
@@ -33,9 +45,9 @@ std::string details_of(const Results& results, const ResultRow& of) {
   for (const ResultRow& row : results.rows)
     if (row.recording && row.split == of.split && row.family == of.family &&
         row.variant == of.variant && row.input_set == of.input_set)
-      text += fmt::format("\n{}: RMSE {}, largest error {}, {} samples", *row.recording,
-                          error_text(row.score.metrics.rmse), error_text(row.score.metrics.max_abs),
-                          row.score.metrics.samples);
+      text += fmt::format("\n{}, with the samples of guards: RMSE {}, largest error {}, {} samples",
+                          *row.recording, error_text(row.score.metrics.rmse),
+                          error_text(row.score.metrics.max_abs), row.score.metrics.samples);
   return text;
 }
 
@@ -119,10 +131,10 @@ ReportDocument comparison_report(const Comparison& comparison, const Dataset& da
   } else {
     const ResultRow& best = *ranked.rows.front();
     document.summary = {fmt::format(
-        "{} has the smallest error of {} models on the {} recordings: RMSE {} {}, largest error {} "
+        "{} has the smallest error of {} models on the {} recordings: RMSE {} {}, largest error "
         "{}.",
         model_label(best), ranked.rows.size(), name(split), error_text(ranked_error(best)),
-        results.unit, error_text(best.score.metrics.max_abs), results.unit)};
+        results.unit, largest_error_text(best, results.unit))};
     document.summary.push_back(fmt::format(
         "{} % of its errors are within two of its error bars (95.4 % if these are right){}.",
         percent_text(best.score.within_2_std_dev),
