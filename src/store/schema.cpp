@@ -57,10 +57,11 @@ CREATE INDEX results_by_value ON results(study, value, trial);
 CREATE TABLE samples(
   trial BIGINT PRIMARY KEY REFERENCES trials(id),
   bytes {bytes_type} NOT NULL);
-CREATE TABLE decisions(
+CREATE TABLE steps(
   study BIGINT NOT NULL REFERENCES studies(id),
   family TEXT NOT NULL,
   step BIGINT NOT NULL,
+  is_decided BIGINT NOT NULL DEFAULT 0,
   PRIMARY KEY(study, family, step));
 )sql";
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -37,6 +38,15 @@ std::string text_or_empty(const DatabaseValue& value) {
 DatabaseValue finite_or_null(double value) {
   if (std::isfinite(value)) return value;
   return std::monostate{};
+}
+
+/// What happens to a trial that lost its worker.
+std::string loss() {
+  return fmt::format(
+      "lost = lost + 1, state = CASE WHEN lost + 1 >= {0} THEN {1} ELSE {2} END, "
+      "reason = CASE WHEN lost + 1 >= {0} THEN 'its worker was lost {0} times: it crashed, was "
+      "killed or had no memory left' ELSE '' END",
+      kMaxLost, number(TrialState::failed), number(TrialState::waiting));
 }
 
 constexpr std::string_view kStudyColumns = "id, name, kind, spec, torsio_version";
@@ -87,6 +97,7 @@ std::optional<StoredStudy> find(Database& database, std::string_view name) {
 void insert_trials(Database& database, std::int64_t study, std::span<const Trial> trials) {
   std::int64_t added = 0;
   double priority = 0.0;
+  std::set<std::pair<std::string, int>> steps;
   for (const Trial& trial : trials) {
     const auto rows = database.run(
         "INSERT INTO trials(study, key, spec, family, device, step, priority) "
@@ -96,6 +107,11 @@ void insert_trials(Database& database, std::int64_t study, std::span<const Trial
     if (rows.empty()) continue;
     ++added;
     priority += trial.priority;
+    if (steps.emplace(trial.group, trial.step).second)
+      database.run(
+          "INSERT INTO steps(study, family, step) VALUES($1, $2, $3) "
+          "ON CONFLICT(study, family, step) DO NOTHING",
+          {study, trial.group, std::int64_t{trial.step}});
   }
   database.run(
       "UPDATE studies SET trials = trials + $2, total_priority = total_priority + $3 "
@@ -221,14 +237,11 @@ std::optional<Claim> StudyStore::claim(std::int64_t study, std::string_view work
                                        double lease_s) {
   return with_connection([&](Database& database) -> std::optional<Claim> {
     Transaction transaction(database);
+    // Without those that another worker is taking back: if it is stopped meanwhile, others do not wait.
     database.run(
-        fmt::format("UPDATE trials SET lost = lost + 1, "
-                    "state = CASE WHEN lost + 1 >= {} THEN {} ELSE {} END, "
-                    "reason = CASE WHEN lost + 1 >= {} THEN 'its worker was lost {} times: ' || "
-                    "'it crashed, was killed or had no memory left' ELSE '' END "
-                    "WHERE study = $1 AND state = {} AND lease_until < {}",
-                    kMaxLost, number(TrialState::failed), number(TrialState::waiting), kMaxLost,
-                    kMaxLost, number(TrialState::running), database.now()),
+        fmt::format("UPDATE trials SET {} WHERE id IN (SELECT id FROM trials WHERE "
+                    "study = $1 AND state = {} AND lease_until < {}{})",
+                    loss(), number(TrialState::running), database.now(), database.skip_locked()),
         {study});
     const auto rows = database.run(
         fmt::format("UPDATE trials SET state = {}, attempt = attempt + 1, worker = $2, "
@@ -311,9 +324,8 @@ std::vector<std::string> StudyStore::take_back(
                          number(TrialState::running)),
              {study})) {
       if (!is_dead(text(row[2]))) continue;
-      database.run(fmt::format("UPDATE trials SET state = {} WHERE id = $1 AND attempt = $2 AND "
-                               "state = {}",
-                               number(TrialState::waiting), number(TrialState::running)),
+      database.run(fmt::format("UPDATE trials SET {} WHERE id = $1 AND attempt = $2 AND state = {}",
+                               loss(), number(TrialState::running)),
                    {whole(row[0]), whole(row[1])});
       keys.push_back(text(row[3]));
     }
@@ -326,13 +338,12 @@ bool StudyStore::advance(
     std::int64_t study,
     const std::function<HalvingDecision(const std::string& group, int step,
                                         std::span<const TrialRecord>)>& decide) {
-  // A group's step without an unfinished trial and without a decision. The cheap question first.
+  // A group's step without an unfinished trial and without a decision. It is asked after each trial:
+  // its cost does not grow with the number of trials. The question without a lock first.
   constexpr std::string_view kOpen =
-      "SELECT DISTINCT t.family, t.step FROM trials t WHERE t.study = $1 "
-      "AND NOT EXISTS(SELECT 1 FROM decisions d WHERE d.study = t.study AND d.family = t.family "
-      "AND d.step = t.step) "
-      "AND NOT EXISTS(SELECT 1 FROM trials u WHERE u.study = t.study AND u.family = t.family AND "
-      "u.step = t.step AND u.state < 2) ORDER BY t.family, t.step";
+      "SELECT s.family, s.step FROM steps s WHERE s.study = $1 AND s.is_decided = 0 "
+      "AND NOT EXISTS(SELECT 1 FROM trials u WHERE u.study = s.study AND u.family = s.family AND "
+      "u.step = s.step AND u.state < 2) ORDER BY s.family, s.step";
   return with_connection([&](Database& database) {
     if (database.run(kOpen, {study}).empty()) return false;
     Transaction transaction(database, kDecisionLock + study);
@@ -349,7 +360,8 @@ bool StudyStore::advance(
         database.run("UPDATE trials SET state = $2, reason = $3 WHERE id = $1",
                      {pruned.trial, number(TrialState::pruned), pruned.reason});
       insert_trials(database, study, decision.next);
-      database.run("INSERT INTO decisions VALUES($1, $2, $3)", {study, group, whole(row[1])});
+      database.run("UPDATE steps SET is_decided = 1 WHERE study = $1 AND family = $2 AND step = $3",
+                   {study, group, whole(row[1])});
     }
     transaction.commit();
     return !open.empty();
@@ -389,13 +401,16 @@ std::vector<TrialRecord> StudyStore::trials(std::int64_t study) {
 }
 
 std::vector<TrialRecord> StudyStore::best(std::int64_t study, std::size_t count,
-                                          std::size_t offset) {
+                                          const TrialRecord* after) {
+  const double value =
+      after == nullptr ? -std::numeric_limits<double>::infinity() : after->result.value;
+  const std::int64_t trial = after == nullptr ? 0 : after->id;
   return with_connection([&](Database& database) {
     return records_from(database.run(
         fmt::format("SELECT {} FROM results r JOIN trials t ON t.id = r.trial WHERE r.study = $1 "
-                    "AND r.value IS NOT NULL ORDER BY r.value, r.trial LIMIT $2 OFFSET $3",
+                    "AND (r.value, r.trial) > ($3, $4) ORDER BY r.value, r.trial LIMIT $2",
                     kTrialColumns),
-        {study, static_cast<std::int64_t>(count), static_cast<std::int64_t>(offset)}));
+        {study, static_cast<std::int64_t>(count), value, trial}));
   });
 }
 

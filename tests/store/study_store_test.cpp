@@ -133,11 +133,17 @@ TEST_P(EachStore, ATrialThatLosesItsWorkerThreeTimesHasFailed) {
   EXPECT_THAT(lost.result.reason, HasSubstr("lost 3 times"));
 }
 
-TEST_P(EachStore, GivingBackAndTakingBackAreNoLosses) {
+TEST_P(EachStore, GivingBackIsNoLoss) {
   StudyStore store(address_);
   const StoredStudy study = store.create_or_resume(a_study(), numbered_trials(1));
   for (int k = 0; k < 5; ++k) store.give_back(*store.claim(study.id, "worker", 60.0));
-  for (int k = 0; k < 5; ++k) {
+  EXPECT_EQ(store.claim(study.id, "worker", 60.0)->attempt, 6);
+}
+
+TEST_P(EachStore, ATrialIsTakenBackFromADeadWorkerTwiceAndThenHasFailed) {
+  StudyStore store(address_);
+  const StoredStudy study = store.create_or_resume(a_study(), numbered_trials(1));
+  for (int k = 0; k < 3; ++k) {
     const auto claim = store.claim(study.id, "dead", 60.0);
     ASSERT_TRUE(claim);
     EXPECT_THAT(store.take_back(study.id, [](const std::string& name) { return name == "x"; }),
@@ -146,7 +152,8 @@ TEST_P(EachStore, GivingBackAndTakingBackAreNoLosses) {
                 ElementsAre("trial 0"));
     EXPECT_FALSE(store.finish(*claim, {.value = 1.0}));
   }
-  EXPECT_EQ(store.claim(study.id, "worker", 60.0)->attempt, 11);
+  EXPECT_FALSE(store.claim(study.id, "worker", 60.0));
+  EXPECT_EQ(store.trials(study.id).front().state, TrialState::failed);
 }
 
 TEST_P(EachStore, ResumesTheSameStudyAndRefusesAnother) {
@@ -223,7 +230,10 @@ TEST_P(EachStore, BestSkipsWhatHasNoValueAndHistoryIsOfOneDevice) {
   while (const auto claim = store.claim(study.id, "worker", 60.0))
     store.finish(*claim, {.value = claim->key == "trial 3" ? kNotMeasured
                                                            : static_cast<double>(claim->trial)});
-  const auto best = store.best(study.id, 2, 1);
+  const auto lowest = store.best(study.id, 1);
+  ASSERT_THAT(lowest, SizeIs(1));
+  EXPECT_EQ(lowest[0].trial.key, "trial 0");
+  const auto best = store.best(study.id, 2, &lowest[0]);
   ASSERT_THAT(best, SizeIs(2));
   EXPECT_EQ(best[0].trial.key, "trial 1");
   EXPECT_EQ(best[1].trial.key, "trial 2");

@@ -136,7 +136,7 @@ class StudyStore {
   void give_back(const Claim& claim);
 
   /// Gives trials back before their leases end, where `is_dead` is certain that the worker of that
-  /// name does not run any more. It counts as no loss. @returns their keys.
+  /// name does not run any more. It counts as a loss. @returns their keys.
   std::vector<std::string> take_back(std::int64_t study,
                                      const std::function<bool(const std::string& worker)>& is_dead);
 
@@ -150,9 +150,9 @@ class StudyStore {
   [[nodiscard]] StudyCounts counts(std::int64_t study);
   /// All trials in the order of their numbers, without `samples`.
   [[nodiscard]] std::vector<TrialRecord> trials(std::int64_t study);
-  /// One page of the table, lowest value first.
+  /// A page of the table, lowest value first: the first one, or that after the last of another page.
   [[nodiscard]] std::vector<TrialRecord> best(std::int64_t study, std::size_t count,
-                                              std::size_t offset = 0);
+                                              const TrialRecord* after = nullptr);
   /// All trials about a device, of all studies, oldest first.
   [[nodiscard]] std::vector<TrialRecord> history(std::string_view device);
   [[nodiscard]] std::string samples(std::int64_t trial);
