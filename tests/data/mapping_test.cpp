@@ -451,6 +451,21 @@ TEST(Mapping, ProposesNoUnitOfAnotherSize) {
     EXPECT_THAT(refusal("gear_angle_rad", counts), testing::HasSubstr("scale: 1/COUNTS")) << counts;
 }
 
+TEST(Mapping, RemarksOnAnUnknownWordInTheRowOfUnitsWhereItStatesNoUnit) {
+  const auto notes = [](const std::string& rule) {
+    const LogTable table = parse_csv("t,x\nms,Inc\n0,1\n1,1\n", "log.csv", {.wanted = {"t", "x"}});
+    const std::vector<std::string> all =
+        measured_recordings(
+            table, parse_mapping("channels: {t_s: {from: t}, q_rad: " + rule + "}", "m.yaml"))
+            .front()
+            .notes;
+    return std::ranges::count_if(
+        all, [](const std::string& note) { return note.find("'Inc'") != std::string::npos; });
+  };
+  EXPECT_EQ(notes("{from: x}"), 1);
+  EXPECT_EQ(notes("{from: x, unit: rev, scale: 1/4096}"), 0);
+}
+
 TEST(Mapping, StatesWhatToWriteForAWordOfADraftThatWasLeft) {
   const auto refusal = [](const std::string& rest) {
     return test::error_message([&] {

@@ -184,7 +184,7 @@ class TableParser {
     std::size_t time_stamps = 0;
   };
 
-  /// Columns of numbers alone: below a date there may be its format.
+  /// Columns of numbers that no mapping reads: below a date there may be its format.
   void note_unknown_units() {
     constexpr std::size_t kMaxWords = 8;
     constexpr std::size_t kMaxNamed = 4;
@@ -192,7 +192,7 @@ class TableParser {
     for (std::size_t i = 0; i < columns_.size(); ++i)
       if (const LogColumn& column = columns_[i];
           state_[i].is_read && column.time == TimeKind::none && !column.unknown_unit.empty() &&
-          columns_by_word.size() < kMaxWords)
+          !is_among(options_.wanted, column.name) && columns_by_word.size() < kMaxWords)
         columns_by_word[column.unknown_unit].push_back(printable(column.name));
     for (const auto& [word, names] : columns_by_word)
       table_.notes.push_back(fmt::format("the row of units has '{}' for {}: {}", printable(word),

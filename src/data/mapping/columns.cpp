@@ -97,6 +97,10 @@ TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
   const Unit* unit = unit_of_source(rule, column, name->unit);
   if (unit == nullptr) throw Error({.place = place, .problem = "unknown unit '" + rule.unit + "'"});
   const double scale = factor_of(rule, *name->unit);
+  if (rule.unit.empty() && !column.unknown_unit.empty() && !split_channel_name(rule.from))
+    used.table().notes.push_back(fmt::format(
+        "the row of units has '{}' for '{}', which is read as {}: state its unit in the mapping",
+        printable(column.unknown_unit), printable(rule.from), unit->suffix));
   if (unit->si_suffix != name->unit->si_suffix && rule.scale == 1.0)
     throw Error({.place = place,
                  .expected = fmt::format("a column in a unit of {}", name->unit->si_suffix),
