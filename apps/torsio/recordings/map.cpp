@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <iostream>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "check/draft/mapping_draft.hpp"
 #include "common/data_flags.hpp"
@@ -20,7 +22,7 @@ namespace {
 
 struct MapFlags {
   DataFlags data;
-  std::string input;
+  std::vector<std::string> inputs;
   std::string output;
   bool yes = false;
   JsonOutput json;
@@ -86,15 +88,18 @@ void show(const MapFlags& flags, const std::string& text) {
 }
 
 void run(MapFlags& flags) {
-  flags.data.check_outputs({flags.output, flags.json.destination}, {flags.input});
+  flags.data.check_outputs({flags.output, flags.json.destination}, flags.inputs);
   if (!flags.output.empty()) require_ending("--output", flags.output, {".yaml", ".yml"});
   ProgressBar progress;
-  const torsio::LogTable table = torsio::read_log(
-      flags.input, {.progress = progress.listener(), .csv = {.leaves_out_texts = true}});
-  torsio::MappingDraft draft = torsio::draft_mapping(table);
-  show(flags, torsio::mapping_draft_picture(table, draft));
-  if (!flags.yes && flags.input != "-" && isatty(STDIN_FILENO) != 0) ask_for_unsure(draft);
-  torsio::try_draft(table, draft);
+  std::vector<torsio::LogTable> tables;
+  for (const std::string& input : flags.inputs)
+    tables.push_back(torsio::read_log(
+        input, {.progress = progress.listener(), .csv = {.leaves_out_texts = true}}));
+  torsio::MappingDraft draft = torsio::draft_mapping(tables);
+  show(flags, torsio::mapping_draft_picture(tables.front(), draft));
+  const bool uses_input = std::ranges::find(flags.inputs, "-") != flags.inputs.end();
+  if (!flags.yes && !uses_input && isatty(STDIN_FILENO) != 0) ask_for_unsure(draft);
+  torsio::try_draft(tables, draft);
   show(flags, torsio::mapping_draft_text(draft));
   if (const std::size_t unsure = unsure_guesses(draft); unsure > 0)
     remark(fmt::format("unsure guesses, to be confirmed in the draft before a model is trained: {}",
@@ -102,7 +107,7 @@ void run(MapFlags& flags) {
   flags.json.write(torsio::mapping_draft_json(draft));
   if (!flags.output.empty()) {
     write_text(flags.output, draft.yaml());
-    remark(fmt::format("{}: next  torsio check {} --mapping {}", flags.output, flags.input,
+    remark(fmt::format("{}: next  torsio check {} --mapping {}", flags.output, draft.file,
                        flags.output));
   } else if (flags.json.wants_tables()) {
     print(draft.yaml());
@@ -120,8 +125,11 @@ void add_map(CLI::App& app) {
       "         torsio check log.csv --mapping mapping.yaml\n"
       "Guesses channel, unit, sign, gear ratio and mask of each column from names and values, and\n"
       "states how sure each is and why. At a terminal it asks for what is unsure: docs/use/map.md");
-  verb->add_option("recording", flags->input,
-                   "CSV, .npz, .mat, MCAP, rosbag2 or ROS 1 bag; - for standard input")
+  verb->add_option(
+          "recording", flags->inputs,
+          "CSV, .npz, .mat, MCAP, rosbag2 or ROS 1 bag; - for standard input. Further logs "
+          "of the same joint and columns, such as one that moves freely, determine the "
+          "gear ratio")
       ->required();
   verb->add_option(
       "-o,--output", flags->output,

@@ -18,8 +18,9 @@ struct KnownRows {
   Eigen::VectorXd motor;
 };
 
-KnownRows known_rows(const std::vector<double>& motor, const std::vector<double>& joint,
-                     const std::vector<double>& torque) {
+/// Each column without its mean.
+KnownRows known_rows(const JointLog& log) {
+  const auto& [motor, joint, torque] = log;
   std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < motor.size(); ++i)
     if (std::isfinite(motor[i]) && std::isfinite(joint[i]) &&
@@ -34,7 +35,29 @@ KnownRows known_rows(const std::vector<double>& motor, const std::vector<double>
     known.inputs(row, 1) = joint[i];
     if (!torque.empty()) known.inputs(row, 2) = torque[i];
   }
+  if (rows.empty()) return known;
+  known.motor.array() -= known.motor.mean();
+  for (Eigen::Index k = 1; k < known.inputs.cols(); ++k)
+    known.inputs.col(k).array() -= known.inputs.col(k).mean();
   return known;
+}
+
+KnownRows known_rows(const std::vector<JointLog>& logs) {
+  std::vector<KnownRows> parts;
+  Eigen::Index rows = 0;
+  for (const JointLog& log : logs) {
+    parts.push_back(known_rows(log));
+    rows += parts.back().motor.size();
+  }
+  KnownRows all{.inputs = Eigen::MatrixXd(rows, parts.front().inputs.cols()),
+                .motor = Eigen::VectorXd(rows)};
+  Eigen::Index row = 0;
+  for (const KnownRows& part : parts) {
+    all.inputs.middleRows(row, part.inputs.rows()) = part.inputs;
+    all.motor.segment(row, part.motor.size()) = part.motor;
+    row += part.motor.size();
+  }
+  return all;
 }
 
 /// What a fit leaves, and its coefficients.
@@ -49,25 +72,40 @@ Fitted fitted(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& motor) {
   return fit;
 }
 
+/// What the fit leaves over what one of two inputs moves without the other.
+double doubt_of(const Fitted& fit, Eigen::Index coefficient, const Eigen::VectorXd& input,
+                const Eigen::VectorXd& other) {
+  const double squares = other.squaredNorm();
+  const Eigen::VectorXd alone =
+      squares > 0.0 ? Eigen::VectorXd(input - input.dot(other) / squares * other) : input;
+  const double moved = std::abs(fit.coefficients[coefficient]) * alone.norm();
+  return moved > 0.0 ? std::sqrt(fit.left) / moved : HUGE_VAL;
+}
+
 double width(const Eigen::VectorXd& values) { return values.maxCoeff() - values.minCoeff(); }
 
 }  // namespace
 
-std::optional<GearFit> fit_gear(const std::vector<double>& motor, const std::vector<double>& joint,
-                                const std::vector<double>& torque) {
-  const KnownRows known = known_rows(motor, joint, torque);
+std::optional<GearFit> fit_gear(const std::vector<JointLog>& logs) {
+  if (logs.empty()) return std::nullopt;
+  const KnownRows known = known_rows(logs);
   const auto rows = static_cast<std::size_t>(known.motor.size());
   if (rows < kFewestRows || !(width(known.inputs.col(1)) > 0.0) || !(width(known.motor) > 0.0))
     return std::nullopt;
   const Fitted with_joint = fitted(known.inputs.leftCols(2), known.motor);
-  const bool has_torque = !torque.empty() && width(known.inputs.col(2)) > 0.0;
+  const bool has_torque = known.inputs.cols() == 3 && width(known.inputs.col(2)) > 0.0;
   const Fitted fit = has_torque ? fitted(known.inputs, known.motor) : with_joint;
   const double variance = (known.motor.array() - known.motor.mean()).square().sum();
   GearFit gear{.factor = fit.coefficients[1], .explained = 1.0 - fit.left / variance};
   const Eigen::VectorXd joint_values = known.inputs.col(1);
   const double joint_variance = (joint_values.array() - joint_values.mean()).square().sum();
   gear.error = std::sqrt(fit.left / static_cast<double>(rows - 2) / joint_variance);
+  const Eigen::VectorXd torque_values = has_torque ? Eigen::VectorXd(known.inputs.col(2))
+                                                   : Eigen::VectorXd::Zero(joint_values.size());
+  gear.doubt = doubt_of(fit, 1, joint_values, torque_values);
   if (has_torque) {
+    gear.doubt_of_torque = doubt_of(fit, 2, torque_values, joint_values);
+    gear.together = joint_values.dot(torque_values) / (joint_values.norm() * torque_values.norm());
     gear.per_torque = fit.coefficients[2];
     gear.by_torque = with_joint.left > 0.0 ? 1.0 - fit.left / with_joint.left : 0.0;
   }

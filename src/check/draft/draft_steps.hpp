@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "check/draft/mapping_draft.hpp"
@@ -10,6 +11,7 @@ namespace torsio {
 /// A draft while it is made.
 struct DraftWork {
   const LogTable& table;
+  std::span<const LogTable> others;  ///< further logs of the joint, with the same columns
   MappingDraft draft;
   std::vector<NameReading> readings;  ///< one for each column
 
@@ -18,7 +20,10 @@ struct DraftWork {
     return table.columns[column].values;
   }
   /// In the SI unit of the guess, with its sign, before the gear.
-  [[nodiscard]] std::vector<double> si_values(std::size_t column) const;
+  [[nodiscard]] std::vector<double> si_values(std::size_t column) const {
+    return si_values(table, column);
+  }
+  [[nodiscard]] std::vector<double> si_values(const LogTable& of, std::size_t column) const;
   /// Columns of a quantity whose unit is known or guessed, measured ones.
   [[nodiscard]] std::vector<std::size_t> measured(Quantity quantity) const;
 };

@@ -57,6 +57,7 @@ std::string ColumnGuess::rule() const {
   if (!unit.empty() && summary.unit_origin != UnitOrigin::dates)
     rule += fmt::format(", unit: {}", unit == "1" ? "\"1\"" : unit);
   if (sign < 0.0) rule += ", sign: -1";
+  if (needs_ratio && gear_ratio == 1.0) rule += ", gear_ratio: N";
   if (gear_ratio != 1.0) rule += fmt::format(", gear_ratio: {:.6g}", gear_ratio);
   if (unwrap > 0.0) rule += fmt::format(", unwrap: {:.0f}", unwrap);
   return rule + "}";

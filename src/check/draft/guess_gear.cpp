@@ -8,6 +8,7 @@
 #include "check/draft/column_relations.hpp"
 #include "check/draft/draft_steps.hpp"
 #include "check/signal_faults.hpp"
+#include "check/signal_pair.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -15,6 +16,11 @@ namespace {
 
 constexpr double kMovesTogether = 0.5;  ///< share of the variance below which nothing is stated
 constexpr double kMovesMuch = 0.99;
+constexpr double kDoubtful = 0.05;       ///< share of the ratio that is not determined: no ratio
+constexpr double kSomeDoubt = 0.01;      ///< up to here a ratio may be sure
+constexpr double kTogether = 0.9;        ///< correlation of joint and torque
+constexpr double kFreeTravel_rad = 1.0;  ///< five times what most springs of joints twist
+constexpr double kDoubtOfSign = 0.3;
 constexpr double kByTorque = 0.1;  ///< share of what is left that shows the torque's sign
 constexpr double kLargestRatio = 400.0;
 constexpr double kLeastRatio = 1.5;  ///< for an angle that is named after the gear
@@ -29,9 +35,24 @@ std::size_t of_side(const DraftWork& work, Side side) {
 }
 
 /// Without steps where a slow sensor holds its value.
-std::vector<double> moving(const DraftWork& work, std::size_t column) {
+std::vector<double> moving(const DraftWork& work, const LogTable& table, std::size_t column) {
   return bridged_or_held(
-      {.name = work.draft.columns[column].channel, .values = work.si_values(column)});
+      {.name = work.draft.columns[column].channel, .values = work.si_values(table, column)});
+}
+
+/// @param torque may be `kNone`
+std::vector<JointLog> logs_of(const DraftWork& work, std::size_t motor, std::size_t joint,
+                              std::size_t torque) {
+  std::vector<JointLog> logs;
+  const auto add = [&](const LogTable& table) {
+    logs.push_back(
+        {.motor = moving(work, table, motor),
+         .joint = moving(work, table, joint),
+         .torque = torque == kNone ? std::vector<double>() : moving(work, table, torque)});
+  };
+  add(work.table);
+  for (const LogTable& other : work.others) add(other);
+  return logs;
 }
 
 void take_side(DraftWork& work, std::size_t column, Side side, Certainty at_most,
@@ -46,6 +67,7 @@ void take_side(DraftWork& work, std::size_t column, Side side, Certainty at_most
 struct Angles {
   std::size_t before = kNone;
   std::size_t after = kNone;
+  bool is_after_gear = false;  ///< by its name, the first one
 };
 
 Angles angles_by_name(const DraftWork& work) {
@@ -53,6 +75,7 @@ Angles angles_by_name(const DraftWork& work) {
   if (const std::size_t gear = of_side(work, Side::gear); gear != kNone) {
     if (angles.after == kNone) angles.after = gear == angles.before ? kNone : angles.after;
     angles.before = gear;  // nearer to the spring than the rotor
+    angles.is_after_gear = true;
   }
   return angles;
 }
@@ -75,7 +98,8 @@ Angles angles_by_width(DraftWork& work, Angles angles) {
       return summary.highest - summary.lowest;
     };
     const bool is_first = width(unknown[0]) >= width(unknown[1]);
-    angles = {.before = unknown[is_first ? 0 : 1], .after = unknown[is_first ? 1 : 0]};
+    angles.before = unknown[is_first ? 0 : 1];
+    angles.after = unknown[is_first ? 1 : 0];
     take_side(work, angles.before, Side::gear, Certainty::unsure,
               "relation: moves farther than the other angle");
     take_side(work, angles.after, Side::joint, Certainty::unsure,
@@ -100,10 +124,34 @@ std::string_view unit_by_ratio(const ColumnGuess& motor, double factor) {
 
 Certainty certainty_of(const GearFit& fit, double ratio) {
   const bool is_whole = ratio == std::round(ratio);
+  if (fit.doubt > kSomeDoubt) return Certainty::unsure;
   if (fit.explained > 0.9999 && is_whole) return Certainty::sure;
   if (fit.explained > kMovesMuch && (is_whole || fit.error < 1e-3 * ratio))
     return Certainty::likely;
   return Certainty::unsure;
+}
+
+/// The ratio is not written, since others fit as well.
+void leave_ratio_open(DraftWork& work, const Angles& angles, const GearFit& fit) {
+  ColumnGuess& motor = work.draft.columns[angles.before];
+  const std::string& joint = work.draft.columns[angles.after].summary.name;
+  const double ratio = std::abs(fit.factor);
+  work.readings[angles.before].side = Side::gear;
+  motor.channel = "gear_angle_rad";
+  motor.add(Certainty::unsure,
+            fmt::format("relation: {:.3g} to {:.3g} times '{}' fit alike",
+                        std::max(1.0 - fit.doubt, 0.0) * ratio, (1.0 + fit.doubt) * ratio, joint));
+  if (angles.is_after_gear) return;
+  motor.needs_ratio = true;
+  motor.missing = fmt::format(
+      "the gear ratio: '{}' {}. Write the ratio in the place of N, or give torsio map a second log "
+      "in which the joint moves without load through {:g} rad or more, five times what the spring "
+      "twists:  torsio map LOG FREE_LOG",
+      joint,
+      std::abs(fit.together) > kTogether
+          ? fmt::format("and the torque move together (correlation {:.2f})", fit.together)
+          : "moves too little beside the spring",
+      kFreeTravel_rad);
 }
 
 void take_ratio(DraftWork& work, const Angles& angles, GearFit fit) {
@@ -137,9 +185,29 @@ void take_ratio(DraftWork& work, const Angles& angles, GearFit fit) {
     motor.add(Certainty::unsure, "relation: one of the two angles has the wrong sign");
 }
 
+/// An elastic load moves the spring with the joint, which only a torque shows.
+void limit_without_torque(DraftWork& work, const Angles& angles) {
+  double width_rad = 0.0;
+  const auto include = [&](const LogTable& table) {
+    width_rad = std::max(width_rad, extent_of(work.si_values(table, angles.after)).width());
+  };
+  include(work.table);
+  for (const LogTable& other : work.others) include(other);
+  work.draft.columns[angles.before].add(
+      width_rad < kFreeTravel_rad ? Certainty::unsure : Certainty::likely,
+      width_rad < kFreeTravel_rad ? "relation: without a torque the twist of the spring is in it"
+                                  : "");
+}
+
 void guess_sign_of_torque(DraftWork& work, const GearFit& fit, std::size_t torque) {
-  if (torque == kNone || fit.by_torque < kByTorque) return;
+  if (torque == kNone) return;
   ColumnGuess& guess = work.draft.columns[torque];
+  if (std::abs(fit.together) > kTogether && fit.doubt_of_torque > kDoubtOfSign) {
+    guess.add(Certainty::unsure,
+              "relation: it moves together with the joint, which does not show its sign");
+    return;
+  }
+  if (fit.by_torque < kByTorque) return;
   const bool rises = fit.per_torque * fit.factor > 0.0;
   if (!rises) guess.sign = -guess.sign;
   guess.add(rises ? Certainty::sure : Certainty::likely,
@@ -151,7 +219,7 @@ void guess_sign_of_torque(DraftWork& work, const GearFit& fit, std::size_t torqu
 void compare_with_deflection(DraftWork& work, std::size_t torque) {
   const std::vector<std::size_t> deflections = work.measured(Quantity::deflection);
   if (torque == kNone || deflections.empty()) return;
-  const auto fit = fit_gear(moving(work, deflections.front()), moving(work, torque), {});
+  const auto fit = fit_gear(logs_of(work, deflections.front(), torque, kNone));
   if (!fit || fit->explained < kMovesTogether) return;
   guess_sign_of_torque(work, {.factor = 1.0, .per_torque = fit->factor, .by_torque = 1.0}, torque);
 }
@@ -170,18 +238,23 @@ void guess_gear(DraftWork& work) {
   compare_with_deflection(work, torque);
   if (angles.before == kNone || angles.after == kNone || angles.before == angles.after) return;
   ColumnGuess& before = work.draft.columns[angles.before];
-  const auto fit = fit_gear(moving(work, angles.before), moving(work, angles.after),
-                            torque == kNone ? std::vector<double>() : moving(work, torque));
+  const auto fit = fit_gear(logs_of(work, angles.before, angles.after, torque));
   if (!fit || fit->explained < kMovesTogether) {
     before.add(Certainty::unsure, fit ? "relation: it does not move with the joint"
                                       : "relation: one of the angles does not move");
     if (work.readings[angles.before].side == Side::motor) {
       before.channel = "gear_angle_rad";
-      before.missing = "the gear ratio, which the angles do not show: add gear_ratio:";
+      before.needs_ratio = true;
+      before.missing = "the gear ratio, which the angles do not show: write it in the place of N";
     }
     return;
   }
-  take_ratio(work, angles, *fit);
+  if (fit->doubt > kDoubtful)
+    leave_ratio_open(work, angles, *fit);
+  else
+    take_ratio(work, angles, *fit);
+  if (torque == kNone && fit->doubt <= kDoubtful && before.gear_ratio != 1.0)
+    limit_without_torque(work, angles);
   guess_sign_of_torque(work, *fit, torque);
 }
 

@@ -10,6 +10,7 @@
 #include "check/draft/column_relations.hpp"
 #include "check/draft/draft_steps.hpp"
 #include "check/rate_factor.hpp"
+#include "data/mapping/unit_words.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -97,14 +98,26 @@ void guess_angle(ColumnGuess& guess, const NameReading& reading) {
               fmt::format("values: a range of {:.3g} fits radians and degrees", width));
 }
 
+/// @param is_before_spring the angle of the motor is the one that is nearest to the spring
 void guess_by_values(ColumnGuess& guess, const NameReading& reading,
-                     const std::vector<double>& values) {
+                     const std::vector<double>& values, bool is_before_spring) {
   const double size = size_of(guess.summary);
   const auto usual = [&](std::string_view unit, bool is_plausible) {
     take_unit(guess, unit, is_plausible ? Certainty::likely : Certainty::unsure,
               fmt::format("values: up to {:.3g}, {} {}", size,
                           is_plausible ? "plausible in" : "much for", unit));
   };
+  if (is_counted(values, guess.summary, reading) && reading.quantity == Quantity::angle &&
+      reading.side == Side::motor && !reading.is_goal && is_before_spring) {
+    guess.channel = "gear_angle_rad";
+    guess.needs_ratio = true;
+    guess.missing =
+        "counts of the motor's encoder: write those of one turn of the motor in the place of "
+        "COUNTS and the gear ratio in that of N (1: without gear)";
+    guess.scale = scale_of_counts(reading.quantity);
+    guess.add(Certainty::unsure, "values: counts");
+    return;
+  }
   if (is_counted(values, guess.summary, reading) && reading.quantity != Quantity::mask) {
     guess.missing = "whole numbers: the size of one, with unit: and scale:";
     guess.scale = scale_of_counts(reading.quantity);
@@ -202,6 +215,9 @@ void guess_sides_of_speeds(DraftWork& work) {
 
 void guess_units(DraftWork& work) {
   const Logger* const logger = logger_of(work.table);
+  const bool is_before_spring = std::ranges::none_of(work.readings, [](const NameReading& reading) {
+    return reading.quantity == Quantity::angle && reading.side == Side::gear;
+  });
   for (std::size_t i = 0; i < work.size(); ++i) {
     ColumnGuess& guess = work.draft.columns[i];
     const NameReading& reading = work.readings[i];
@@ -211,6 +227,15 @@ void guess_units(DraftWork& work) {
     const Unit* const word = find_unit(reading.unit);
     if (guess.summary.measured == 0) {
       guess.missing = "it has no numbers";
+    } else if (const std::string& written = work.table.columns[i].unknown_unit;
+               is_gradian_or_degree(written)) {
+      guess.missing = kAdviceOnGradians;
+      guess.scale = "unit: deg";
+      guess.add(Certainty::unsure, fmt::format("unit: '{}' (row of units)", written));
+    } else if (!written.empty() && !is_count(written)) {
+      guess.missing = fmt::format("the size of its unit '{}', with unit: and scale:", written);
+      guess.scale = scale_of_counts(reading.quantity);
+      guess.add(Certainty::unsure, "unit: in the row of units, not known");
     } else if (has_unknown_brackets(guess.summary.name)) {
       guess.missing = "the size of the unit in its brackets, with unit: and scale:";
       guess.scale = scale_of_counts(reading.quantity);
@@ -225,7 +250,7 @@ void guess_units(DraftWork& work) {
                reading.quantity != Quantity::temperature) {
       take_unit(guess, si, Certainty::likely, "unit: SI, as ROS prescribes (REP 103)");
     } else {
-      guess_by_values(guess, reading, work.values(i));
+      guess_by_values(guess, reading, work.values(i), is_before_spring);
     }
     if (guess.unit.empty() && guess.missing.empty())
       guess.missing = reading.quantity == Quantity::force

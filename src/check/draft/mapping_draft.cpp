@@ -9,6 +9,7 @@
 #include "check/draft/draft_steps.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
+#include "data/mapping/unit_words.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -62,6 +63,27 @@ void require_motion(const LogTable& table, const MappingDraft& draft) {
                .advice = "Record while the joint moves, or name the right file."});
 }
 
+void require_same_columns(const LogTable& first, const LogTable& other) {
+  const bool is_same =
+      std::ranges::equal(first.columns, other.columns, [](const LogColumn& a, const LogColumn& b) {
+        return a.name == b.name && a.unit == b.unit && a.unknown_unit == b.unknown_unit;
+      });
+  if (is_same) return;
+  throw Error({.place = other.source.file,
+               .expected = fmt::format("the columns and units of {}: {}", first.source.file,
+                                       first.column_list()),
+               .found = other.column_list(),
+               .advice = "Give logs of one joint from one logger, or torsio map one by one."});
+}
+
+void include_range(const LogTable& table, std::size_t column, ColumnSummary& summary) {
+  for (const double value : table.columns[column].values) {
+    if (!std::isfinite(value)) continue;
+    summary.lowest = std::min(summary.lowest, value);
+    summary.highest = std::max(summary.highest, value);
+  }
+}
+
 /// Columns that cannot be read would be, because of the units in their names: they must be left out by name.
 void drop_unreadable(const LogTable& table, MappingDraft& draft) {
   for (const std::string& left_out : table.not_read) {
@@ -74,10 +96,11 @@ void drop_unreadable(const LogTable& table, MappingDraft& draft) {
 }
 
 /// @returns whether a recording can be read with this clock
-bool is_read_with(const LogTable& table, MappingDraft& draft) {
+bool is_read_with(std::span<const LogTable> tables, MappingDraft& draft) {
   draft.refusal.clear();
   try {
-    (void)measured_recordings(table, parse_mapping(draft.yaml(), "draft"));
+    for (const LogTable& table : tables)
+      (void)measured_recordings(table, parse_mapping(draft.yaml(), "draft"));
     return true;
   } catch (const ClockError& error) {
     draft.refusal = error.what();
@@ -98,6 +121,16 @@ void add_remarks(MappingDraft& draft) {
   if (draft.of("spring_deflection_rad") != nullptr ||
       (draft.of("gear_angle_rad") != nullptr && has_joint))
     return;
+  const auto unfinished = std::ranges::find_if(draft.columns, [](const ColumnGuess& guess) {
+    return guess.channel == "gear_angle_rad" && !guess.is_written();
+  });
+  if (has_joint && unfinished != draft.columns.end()) {
+    draft.remarks.push_back(
+        fmt::format("no deflection: it is gear_angle_rad - joint_angle_rad; complete the line of "
+                    "gear_angle_rad below, from '{}', and remove the # before it",
+                    printable(unfinished->summary.name)));
+    return;
+  }
   draft.remarks.emplace_back(
       std::string("no deflection: it is gear_angle_rad - joint_angle_rad; ") +
       (has_joint ? "name the angle spring_deflection_rad if the other side is clamped, or add "
@@ -122,9 +155,9 @@ void ColumnGuess::add(Certainty at_most, std::string reason) {
   if (!reason.empty()) reasons.push_back(std::move(reason));
 }
 
-std::vector<double> DraftWork::si_values(std::size_t column) const {
+std::vector<double> DraftWork::si_values(const LogTable& of, std::size_t column) const {
   const ColumnGuess& guess = draft.columns[column];
-  std::vector<double> si = values(column);
+  std::vector<double> si = of.columns[column].values;
   if (const Unit* const unit = find_unit(guess.unit); unit != nullptr)
     for (double& value : si) value = guess.sign * unit->si(value);
   return si;
@@ -147,9 +180,17 @@ const ColumnGuess* MappingDraft::of(std::string_view channel) const {
   return at == columns.end() ? nullptr : &*at;
 }
 
-MappingDraft draft_mapping(const LogTable& table) {
+MappingDraft draft_mapping(std::span<const LogTable> tables) {
+  const LogTable& table = tables.front();
   require_numbers(table);
-  DraftWork work{.table = table, .draft = {.file = table.source.file}, .readings = {}};
+  DraftWork work{.table = table,
+                 .others = tables.subspan(1),
+                 .draft = {.file = table.source.file},
+                 .readings = {}};
+  for (const LogTable& other : work.others) {
+    require_same_columns(table, other);
+    work.draft.file += " " + other.source.file;
+  }
   for (ColumnSummary& summary : column_summaries(table)) {
     const bool is_word = ends_in_letter(summary);
     if (is_word) {
@@ -157,6 +198,10 @@ MappingDraft draft_mapping(const LogTable& table) {
       summary.unit_origin = UnitOrigin::none;
     }
     work.readings.push_back(read_name(name_without_unit(summary)));
+    const LogColumn& column = table.columns[work.readings.size() - 1];
+    if (is_count(column.unknown_unit)) work.readings.back().is_counted = true;
+    for (const LogTable& other : work.others)
+      include_range(other, work.readings.size() - 1, summary);
     work.draft.columns.push_back({.summary = std::move(summary)});
     if (is_word)
       work.draft.columns.back().reasons.emplace_back("name: its last letter is not its unit");
@@ -176,21 +221,21 @@ MappingDraft draft_mapping(const LogTable& table) {
   return std::move(work.draft);
 }
 
-void try_draft(const LogTable& table, MappingDraft& draft) {
+void try_draft(std::span<const LogTable> tables, MappingDraft& draft) {
   draft.clock.clear();
   if (std::ranges::none_of(draft.columns, &ColumnGuess::is_written)) {
     draft.refusal = "no column was recognised: write channels: by hand";
     return;
   }
-  if (is_read_with(table, draft)) return;
+  if (is_read_with(tables, draft)) return;
   const std::string even = draft.refusal;
   draft.clock = "{rebuild: true}";
   draft.clock_reason = "the stamps are coarse or jitter: spread evenly";
-  if (is_read_with(table, draft)) return;
+  if (is_read_with(tables, draft)) return;
   if (draft.rate_Hz > 0.0) {
     draft.clock = fmt::format("{{resample: {:.4g}Hz}}", draft.rate_Hz);
     draft.clock_reason = "the stamps are uneven: interpolated at their usual rate";
-    if (is_read_with(table, draft)) return;
+    if (is_read_with(tables, draft)) return;
   }
   draft.clock.clear();
   draft.clock_reason.clear();
@@ -220,6 +265,7 @@ void answer(MappingDraft& draft, std::size_t column, std::string_view text) {
   guess.unit = parts->unit->suffix;
   guess.missing.clear();
   if (!is_same) guess.sign = guess.gear_ratio = 1.0;
+  guess.needs_ratio = false;
   guess.certainty = Certainty::sure;
   guess.reasons.emplace_back("stated by the user");
 }

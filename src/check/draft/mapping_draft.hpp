@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,6 +29,7 @@ struct ColumnGuess {
   bool is_unit_by_range = false;  ///< its unit is a guess from the range of the numbers
   double sign = 1.0;
   double gear_ratio = 1.0;
+  bool needs_ratio = false;  ///< the user has to state the gear ratio
   std::string scale = {};    ///< for the user to complete: "unit: rev, scale: 1/COUNTS"
   double unwrap = 0.0;       ///< the span after which a counter begins again; 0: none
   bool holds = false;        ///< slower than the log
@@ -43,7 +45,7 @@ struct ColumnGuess {
 
 /// A mapping that was guessed from names and values.
 struct MappingDraft {
-  std::string file = {};
+  std::string file = {};                   ///< several: with blanks between them
   std::vector<ColumnGuess> columns = {};   ///< as in the file
   std::vector<std::string> not_read = {};  ///< columns that cannot be channels, with the reason
   std::vector<std::string> dropped = {};   ///< names of those that must be left out
@@ -57,11 +59,19 @@ struct MappingDraft {
   [[nodiscard]] std::string yaml() const;
 };
 
-/// Guesses from a table that was read without mapping, with columns of texts left out.
-[[nodiscard]] MappingDraft draft_mapping(const LogTable& table);
+/// Guesses from tables that were read without mapping, with columns of texts left out: logs of one joint. Names and
+/// values are those of the first; the gear ratio and the signs follow from all of them.
+/// @throws Error if their columns differ
+[[nodiscard]] MappingDraft draft_mapping(std::span<const LogTable> tables);
+[[nodiscard]] inline MappingDraft draft_mapping(const LogTable& table) {
+  return draft_mapping(std::span(&table, 1));
+}
 
-/// Reads the table with the draft, and adds what its clock needs, or why that does not work (`refusal`).
-void try_draft(const LogTable& table, MappingDraft& draft);
+/// Reads the tables with the draft, and adds what their clock needs, or why that does not work (`refusal`).
+void try_draft(std::span<const LogTable> tables, MappingDraft& draft);
+inline void try_draft(const LogTable& table, MappingDraft& draft) {
+  try_draft(std::span(&table, 1), draft);
+}
 
 /// A user's answer for a column: a channel with the unit of the numbers ("joint_angle_deg"), "-" for none, nothing for
 /// the guess as it is. @throws UsageError if it has no unit or another column is that channel.

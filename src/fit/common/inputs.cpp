@@ -121,9 +121,13 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
     throw UsageError({.place = first.name(),
                       .expected = "spring_deflection_rad, or gear_angle_rad and joint_angle_rad",
                       .found = fmt::format("{}", fmt::join(channel_names(first.channels()), ", ")),
-                      .advice =
-                          "Name the model's inputs with --inputs, or bring the deflection in with "
-                          "--mapping: derive or rename it there."});
+                      .advice = first.has("motor_angle_rad") && first.has("joint_angle_rad")
+                                    ? "motor_angle_rad is before the gear. In the mapping, name it "
+                                      "gear_angle_rad and state the ratio:  gear_angle_rad: {from: "
+                                      "COLUMN, gear_ratio: N}"
+                                    : "Name the model's inputs with --inputs, or bring the "
+                                      "deflection in with "
+                                      "--mapping: derive or rename it there."});
   FeatureSpec spec = as_asked([&] {
     std::vector<std::string> channels;
     for (const std::string& input : inputs)

@@ -134,7 +134,7 @@ LoggerStyle microcontroller() {
   return {.name = "microcontroller, counts",
           .preamble = "# teensy 4.1, loop 250 Hz\n",
           .columns = {{"micros", "t_s", "us", counts(&JointState::t_s, 1e6)},
-                      {"enc_motor", "motor_angle_rad", "",
+                      {"enc_motor", "gear_angle_rad", "",
                        counts(&JointState::motor_rad, kEncoderCounts / kTurn)},
                       {"enc_joint", "joint_angle_rad", "",
                        counts(&JointState::joint_rad, kEncoderCounts / kTurn)},

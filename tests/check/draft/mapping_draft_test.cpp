@@ -10,9 +10,11 @@
 #include <fstream>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "check/draft/logger_styles.hpp"
 #include "data/csv/csv_table.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "support/error_message.hpp"
 #include "support/file_bytes.hpp"
 #include "torsio/core/error.hpp"
@@ -121,6 +123,114 @@ TEST(MappingDraft, InvertsATorqueThatFallsWithTheDeflection) {
   EXPECT_THAT(draft.yaml(), HasSubstr("falls with the deflection"));
 }
 
+/// A link that is held by a load of 300 Nm/rad on a spring of 350 Nm/rad with friction, and a torque of the other sign.
+std::string elastic_log(const std::string& header) {
+  std::string text = header + "\n";
+  for (int row = 0; row < 2000; ++row) {
+    const double t = 0.004 * row;
+    const double torque = 25.0 * std::sin(1.9 * t) + 6.0 * std::sin(4.1 * t);
+    const double rate = 25.0 * 1.9 * std::cos(1.9 * t) + 6.0 * 4.1 * std::cos(4.1 * t);
+    const double joint = torque / 300.0;
+    const double motor = 80.0 * (joint + torque / 350.0 + 0.004 * std::tanh(0.2 * rate));
+    text += fmt::format("{:.3f},{:.6f},{:.6f},{:.5f}\n", t, motor, joint, -torque);
+  }
+  return text;
+}
+
+constexpr const char* kJointHeader = "t_s,motor_angle_rad,joint_angle_rad,torque_Nm";
+
+TEST(MappingDraft, AssertsNoRatioWhereJointAndTorqueMoveTogether) {
+  const MappingDraft draft = draft_of(elastic_log(kJointHeader));
+  EXPECT_EQ(draft.of("gear_angle_rad"), nullptr) << draft.yaml();
+  EXPECT_THAT(
+      draft.yaml(),
+      AllOf(HasSubstr("# gear_angle_rad: {from: motor_angle_rad, unit: rad, gear_ratio: N}"),
+            HasSubstr("move together (correlation -1.00)"),
+            HasSubstr("moves without load through 1 rad or more"),
+            HasSubstr("complete the line of gear_angle_rad below")));
+  ASSERT_NE(draft.of("torque_Nm"), nullptr);
+  EXPECT_EQ(draft.of("torque_Nm")->sign, 1.0);
+  EXPECT_EQ(draft.of("torque_Nm")->certainty, Certainty::unsure);
+}
+
+TEST(MappingDraft, TakesTheRatioFromASecondLogInWhichTheJointMovesFreely) {
+  const std::vector<LogTable> tables = {table_of(elastic_log(kJointHeader)),
+                                        table_of(joint_log(kJointHeader, -1.0))};
+  MappingDraft draft = draft_mapping(tables);
+  try_draft(tables, draft);
+  ASSERT_NE(draft.of("gear_angle_rad"), nullptr) << draft.yaml();
+  EXPECT_EQ(draft.of("gear_angle_rad")->gear_ratio, 80.0);
+  EXPECT_EQ(draft.of("torque_Nm")->sign, -1.0) << draft.yaml();
+  EXPECT_EQ(draft.refusal, "");
+  const std::vector<LogTable> others = {tables.front(), table_of(joint_log("t_s,a,b,c"))};
+  EXPECT_THAT(error_message([&] { (void)draft_mapping(others); }),
+              HasSubstr("expected the columns and units of log.csv: t_s, motor_angle_rad"));
+}
+
+TEST(MappingDraft, WithoutATorqueALittleMotionShowsNoSureRatio) {
+  std::string text = "t_s,motor_angle_rad,joint_angle_rad\n";
+  for (int row = 0; row < 800; ++row)
+    text += fmt::format("{:.3f},{:.6f},{:.6f}\n", 0.004 * row, 148.0 * 0.1 * std::sin(0.02 * row),
+                        0.1 * std::sin(0.02 * row));
+  const MappingDraft draft = draft_of(text);
+  ASSERT_NE(draft.of("gear_angle_rad"), nullptr) << draft.yaml();
+  EXPECT_EQ(draft.of("gear_angle_rad")->certainty, Certainty::unsure);
+}
+
+/// With the counts of an encoder of 16384 on the motor, in a row of units.
+std::string counted_log() {
+  std::string text = "Zeit;Motorposition;Abtriebswinkel;Drehmoment\nms;Inc;Grad;N\u00b7m\n";
+  for (int row = 0; row < 800; ++row) {
+    const test::JointState state = test::joint_at(row);
+    text +=
+        fmt::format("{:.0f};{:.0f};{:.6f};{:.5f}\n", 1e3 * state.t_s,
+                    std::floor(80.0 / test::kStyleRatio * state.motor_rad / 6.283185307 * 16384.0),
+                    57.29577951 * state.joint_rad, state.torque_Nm);
+  }
+  return text;
+}
+
+TEST(MappingDraft, OfCountsOfTheMotorHasALineThatIsReadOnceItIsComplete) {
+  const MappingDraft draft = draft_of(counted_log());
+  const std::string yaml = draft.yaml();
+  const std::string line =
+      "# gear_angle_rad: {from: Motorposition, unit: rev, scale: 1/COUNTS, gear_ratio: N}  # not "
+      "shown by the data: counts of the motor's encoder: write those of one turn";
+  ASSERT_THAT(yaml, HasSubstr(line));
+  EXPECT_THAT(yaml, HasSubstr("complete the line of gear_angle_rad below, from 'Motorposition'"));
+  EXPECT_THAT(yaml, HasSubstr("joint_angle_rad: {from: Abtriebswinkel, unit: deg}  # sure"));
+  std::string completed = yaml;
+  completed.replace(completed.find("# gear_angle_rad"), 2, "");
+  const auto replace = [&](const std::string& word, const std::string& by) {
+    completed.replace(completed.find(word), word.size(), by);
+  };
+  EXPECT_THAT(error_message([&] { (void)parse_mapping(completed, "m.yaml"); }),
+              HasSubstr("Write the counts of one turn of the encoder in the place of COUNTS"));
+  replace("1/COUNTS", "1/16384");
+  EXPECT_THAT(error_message([&] { (void)parse_mapping(completed, "m.yaml"); }),
+              HasSubstr("Write the gear ratio in the place of N"));
+  replace("gear_ratio: N", "gear_ratio: 80");
+  const std::vector<Recording> read =
+      measured_recordings(table_of(counted_log()), parse_mapping(completed, "m.yaml"));
+  const test::JointState last = test::joint_at(799);
+  EXPECT_NEAR(read.front().channel("gear_angle_rad").values.back(),
+              last.motor_rad / test::kStyleRatio, 1e-5);
+}
+
+TEST(MappingDraft, ReadsNoUnitThatHasTwoMeaningsOrNone) {
+  const std::string grad = [] {
+    std::string text = counted_log();
+    text.replace(text.find("Grad"), 4, "grad");
+    return text;
+  }();
+  EXPECT_THAT(draft_of(grad).yaml(),
+              HasSubstr("# joint_angle_rad: {from: Abtriebswinkel, unit: deg}  # not shown by the "
+                        "data: It may be degrees"));
+  std::string unknown = counted_log();
+  unknown.replace(unknown.find("Grad"), 4, "Foo");
+  EXPECT_THAT(draft_of(unknown).yaml(), HasSubstr("the size of its unit 'Foo'"));
+}
+
 TEST(MappingDraft, WritesWhatTheDataDoNotShowAsAComment) {
   std::string text = "t_s,motor_rad,joint_rad,torque_Nm\n";
   for (int row = 0; row < 300; ++row)
@@ -128,8 +238,9 @@ TEST(MappingDraft, WritesWhatTheDataDoNotShowAsAComment) {
                         5.0 * std::sin(0.05 * row));
   const MappingDraft draft = draft_of(text);  // the joint is clamped
   EXPECT_EQ(draft.of("gear_angle_rad"), nullptr);
-  EXPECT_THAT(draft.yaml(), HasSubstr("# gear_angle_rad: {from: motor_rad, unit: rad}  # not shown "
-                                      "by the data: the gear ratio"));
+  EXPECT_THAT(draft.yaml(),
+              HasSubstr("# gear_angle_rad: {from: motor_rad, unit: rad, gear_ratio: N}  "
+                        "# not shown by the data: the gear ratio"));
 }
 
 TEST(MappingDraft, TakesNoMaskThatDoesNotMarkAChannel) {
