@@ -326,10 +326,24 @@ void Checker::check_offsets() {
       records.push_back(r);
       spread = std::max(spread, extent_of(pairs_[r].target).width());
     }
-    if (pairs.size() < 2) return;
-    const std::vector<RecordLine> lines = compare_records(pairs, trained);
-    for (std::size_t k = 0; k < lines.size(); ++k) report_line(records[k], lines[k], spread);
+    if (pairs.size() > 1) {
+      const std::vector<RecordLine> lines = compare_records(pairs, trained);
+      for (std::size_t k = 0; k < lines.size(); ++k) report_line(records[k], lines[k], spread);
+    }
+    for (const std::size_t r : records)
+      if (std::ranges::none_of(findings_, [&](const Finding& found) {
+            return found.check == "offsets" &&
+                   found.recording == dataset_.records[r].recording.name();
+          }))
+        check_unloaded(r);
   });
+}
+
+/// The same offset as one of the deflection.
+std::string Checker::zero_of_input_text(std::size_t r, double offset) const {
+  const double slope = line_through(pairs_[r]).slope;
+  if (!is_deflection(r) || !(std::abs(slope) > 0.0)) return {};
+  return fmt::format(", as if {} were {:.3g} rad off", spec_.inputs.front(), offset / slope);
 }
 
 void Checker::report_line(std::size_t r, const RecordLine& line, double spread) {
@@ -340,10 +354,17 @@ void Checker::report_line(std::size_t r, const RecordLine& line, double spread) 
                                       : "the training recordings";
   if (std::abs(line.offset) > kOffsetShare * spread)
     add(std::abs(line.offset) > spread ? Verdict::fail : Verdict::warn, "offsets", recording.name(),
-        fmt::format("the zero is {:.3g} {} away from that of {}{}", line.offset,
+        fmt::format("the zero is {:.3g} {} away from that of {}{}{}", line.offset,
                     unit_label(dataset_.target), others,
-                    std::abs(line.offset) > spread ? ", more than the range of the torque" : ""),
-        "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: 0.1s}]");
+                    std::abs(line.offset) > spread ? ", more than the range of the torque" : "",
+                    zero_of_input_text(r, line.offset)),
+        is_deflection(r)
+            ? fmt::format(
+                  "Remove the zero of each recording in the mapping, at rest without load:  "
+                  "{}  or that of {}, if its sensor drifts",
+                  zero_line(0.1), dataset_.target)
+            : "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: "
+              "0.1s}]");
   if (std::abs(line.slope - 1.0) > kGainChange && recording.conditions().empty())
     add(Verdict::warn, "offsets", recording.name(),
         fmt::format("{} rises {:.3g} times as steeply with {} as in {}", dataset_.target,

@@ -272,4 +272,67 @@ void Checker::check_zeros() {
   });
 }
 
+/// Whether the first input is the twist of a spring, recorded or as the difference of two angles.
+bool Checker::is_deflection(std::size_t r) const {
+  const auto parts = split_channel_name(sources_.front());
+  return parts && parts->unit->si_suffix == "rad" &&
+         (order_of_difference(r) != 0 || spec_.inputs.front() == "spring_deflection_rad");
+}
+
+/// "zero: [{channel: gear_angle_rad, first: 0.1s}, ..]"
+std::string Checker::zero_line(double first_s) const {
+  std::string rules;
+  for (const std::string& source : sources_)
+    rules +=
+        fmt::format("{}{{channel: {}, first: {:g}s}}", rules.empty() ? "" : ", ", source, first_s);
+  return fmt::format("zero: [{}]", rules);
+}
+
+// A spring that carries no torque is not twisted: otherwise an encoder has another zero, as an incremental one after each
+// start.
+void Checker::check_unloaded(std::size_t r) {
+  constexpr double kNearZero = 0.04;   // share of the range of the torque
+  constexpr double kBothSides = 0.05;  // share of it on either side of zero
+  constexpr double kFarOff = 0.15;     // share of the range of the deflection
+  constexpr double kUsualRest_s = 0.1;
+  if (!is_deflection(r)) return;
+  const auto target = split_channel_name(dataset_.target);
+  if (!target || target->unit->si_suffix != "Nm") return;
+  const Pair& pair = pairs_[r];
+  if (std::abs(correlation(pair.input, pair.target)) < kTogether) return;
+  const auto [twist, torque] = known_extents(pair);
+  if (!(std::min(-torque.lowest, torque.highest) > kBothSides * torque.width())) return;
+  Extent unloaded;
+  double sum = 0.0;
+  std::size_t samples = 0;
+  for (std::size_t i = 0; i < pair.input.size(); ++i) {
+    if (!is_known(pair, i) || std::abs(pair.target[i]) > kNearZero * torque.width()) continue;
+    unloaded.include(pair.input[i]);
+    sum += pair.input[i];
+    ++samples;
+  }
+  if (samples < 2) return;
+  const double zero_rad = sum / static_cast<double>(samples);
+  // Within the friction of the spring, zero torque has no single twist.
+  if (std::abs(zero_rad) < std::max(kFarOff * twist.width(), unloaded.width())) return;
+  constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+  const double turns = std::round(zero_rad / kTurn_rad);
+  if (turns != 0.0 && std::abs(zero_rad - turns * kTurn_rad) < kLargestZero_rad)
+    return;  // `check_turns_between`
+  const Recording& recording = dataset_.records[r].recording;
+  const bool has_zero = std::ranges::any_of(
+      recording.zeros, [&](const ZeroRule& zero) { return is_source(zero.channel); });
+  add(Verdict::warn, "offsets", recording.name(),
+      fmt::format("{} is zero at {} = {:.3g} rad instead of 0, a constant offset ({:.0f} % of the "
+                  "range of {:.3g} rad)",
+                  dataset_.target, spec_.inputs.front(), zero_rad,
+                  100.0 * std::abs(zero_rad) / twist.width(), twist.width()),
+      has_zero ? "The zero of the mapping was taken while the spring was loaded: take it at rest "
+                 "without load."
+               : fmt::format("An encoder or the torque sensor has another zero; that of an "
+                             "incremental encoder changes with each start. Mapping line for a "
+                             "recording that begins at rest without load:  {}",
+                             zero_line(kUsualRest_s)));
+}
+
 }  // namespace torsio

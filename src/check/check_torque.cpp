@@ -102,36 +102,56 @@ void Checker::check_limit(std::size_t r) {
       std::move(places));
 }
 
+/// How many times as far as the spring the joint moves, in the recording where it moves farthest; nothing where the first
+/// input is not the difference of two angles.
+std::optional<double> Checker::farthest_travel() const {
+  std::optional<double> farthest;
+  for (std::size_t r = 0; r < sides_.size(); ++r)
+    if (sides_[r] && spoiled_[r] == 0)
+      farthest = std::max(farthest.value_or(0.0), sides_[r]->travel);
+  return farthest;
+}
+
 void Checker::check_position() {
-  pass_unless_found("position", "the torque does not depend on the angle of the joint", [&] {
-    for_each_record([&](std::size_t r) {
-      if (spoiled_[r] != 0) return;
-      const std::string& recording = dataset_.records[r].recording.name();
-      if (const auto& effect = positions_[r]) {
-        add(Verdict::warn, "position", recording,
-            fmt::format(
-                "{} depends on {} by {:.3g} {} at equal {} ({:.2g} % unexplained without it, "
-                "{:.2g} % with it)",
-                dataset_.target, kJointAngle, effect->amplitude, unit_label(dataset_.target),
-                spec_.inputs.front(), 100.0 * effect->unexplained,
-                100.0 * effect->unexplained * effect->left),
-            "The weight of a link bends the sensor, or an encoder has an error once per turn: "
-            "mount "
-            "the sensor without bending loads, calibrate the encoder, or record the error and "
-            "subtract it.");
-      } else if (const auto& sides = sides_[r]; sides && !changes_[r] && has_wrong_scale(*sides) &&
-                                                std::abs(sides->excess) < kScaleOfAGear) {
-        // Over a part of a turn a sine is nearly a line.
-        add(Verdict::warn, "position", recording,
-            fmt::format("apart from the deflection, {} depends on the angle of the joint as if {} "
-                        "moved {:.4g} times as far as {}",
-                        dataset_.target, sources_[0], 1.0 + sides->excess, sources_[1]),
-            "The weight of a link that bends the sensor looks like this, and so does a scale that "
-            "is "
-            "wrong by that share: turn the unloaded joint and compare the two angles.");
-      }
-    });
+  const auto travel = farthest_travel();
+  const bool is_examined = !travel || *travel >= kFarTravel;
+  const std::size_t before = findings_.size();
+  for_each_record([&](std::size_t r) {
+    if (spoiled_[r] != 0) return;
+    const std::string& recording = dataset_.records[r].recording.name();
+    if (const auto& effect = positions_[r]) {
+      add(Verdict::warn, "position", recording,
+          fmt::format("{} depends on {} by {:.3g} {} at equal {} ({:.2g} % unexplained without it, "
+                      "{:.2g} % with it)",
+                      dataset_.target, kJointAngle, effect->amplitude, unit_label(dataset_.target),
+                      spec_.inputs.front(), 100.0 * effect->unexplained,
+                      100.0 * effect->unexplained * effect->left),
+          "The weight of a link bends the sensor, or an encoder has an error once per turn: "
+          "mount "
+          "the sensor without bending loads, calibrate the encoder, or record the error and "
+          "subtract it.");
+    } else if (const auto& sides = sides_[r]; sides && !changes_[r] && has_wrong_scale(*sides) &&
+                                              std::abs(sides->excess) < kScaleOfAGear) {
+      // Over a part of a turn a sine is nearly a line.
+      add(Verdict::warn, "position", recording,
+          fmt::format("apart from the deflection, {} depends on the angle of the joint as if {} "
+                      "moved {:.4g} times as far as {}",
+                      dataset_.target, sources_[0], 1.0 + sides->excess, sources_[1]),
+          "The weight of a link that bends the sensor looks like this, and so does a scale that "
+          "is "
+          "wrong by that share: turn the unloaded joint and compare the two angles.");
+    }
   });
+  if (findings_.size() != before) return;
+  add(Verdict::pass, "position", "",
+      is_examined
+          ? "the torque does not depend on the angle of the joint"
+          : fmt::format("not examined: the joint moves too little, {:.2g} times as far as the "
+                        "spring ({:g} are needed); a wrong gear ratio would not be found",
+                        *travel, kFarTravel),
+      is_examined ? ""
+                  : "Record the joint once while it moves far without load, and check that "
+                    "recording, too.");
 }
 
 }  // namespace torsio

@@ -123,7 +123,12 @@ class Checker {
   [[nodiscard]] std::optional<double> noise_of_target(std::size_t r) const;
   void report_plateau(std::size_t r, const Plateau& plateau);
   void check_position();
+  [[nodiscard]] std::optional<double> farthest_travel() const;
   void check_zeros();
+  void check_unloaded(std::size_t r);
+  [[nodiscard]] bool is_deflection(std::size_t r) const;
+  [[nodiscard]] std::string zero_line(double first_s) const;
+  [[nodiscard]] std::string zero_of_input_text(std::size_t r, double offset) const;
   void take_out_other_inputs();
   void check_explanation();
   [[nodiscard]] FeatureSpec spec_of(std::size_t input) const;

@@ -48,7 +48,6 @@ constexpr double kScaleRest = 2e-3;  ///< a torque that changed its gain leaves 
 constexpr double kSideShare = 0.4;
 constexpr double kSmallScale = 0.01;
 constexpr double kInverted = -0.5;  ///< an angle that does not move, or has the wrong sign
-constexpr double kFar = 5.0;
 constexpr double kSome = 1.5;
 constexpr double kSmallRest = 0.2;
 
@@ -380,7 +379,7 @@ std::optional<TwoSides> relate_sides(const std::vector<double>& first,
 }
 
 bool has_wrong_scale(const TwoSides& sides) {
-  return sides.travel >= kFar && sides.unexplained <= kScaleRest &&
+  return sides.travel >= kFarTravel && sides.unexplained <= kScaleRest &&
          std::abs(sides.excess) >= kSmallScale && sides.excess > kInverted &&
          sides.unexplained <= kScaleShare * sides.without_excess;
 }

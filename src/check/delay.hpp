@@ -70,6 +70,8 @@ struct TwoSides {
                                                    const std::vector<double>& torque,
                                                    double sample_rate_Hz);
 
+/// `TwoSides::travel` from which on a wrong scale is found.
+inline constexpr double kFarTravel = 5.0;
 /// A wrong scale or gear ratio: at least 1 % where the joint moves far.
 [[nodiscard]] bool has_wrong_scale(const TwoSides& sides);
 [[nodiscard]] bool has_late_side(const TwoSides& sides, double sample_rate_Hz);

@@ -108,7 +108,9 @@ std::string labels_text(const Recording& recording) {
   return text;
 }
 
-std::string log_summary_json(const LogSummary& summary) {
+namespace {
+
+nlohmann::ordered_json summary_json(const LogSummary& summary) {
   nlohmann::ordered_json topics = nlohmann::ordered_json::array();
   for (const TopicSummary& topic : summary.topics) {
     topics.push_back({{"topic", topic.topic},
@@ -133,7 +135,21 @@ std::string log_summary_json(const LogSummary& summary) {
   for (const auto& [condition, value] : summary.conditions)
     document["conditions"][condition] = value;
   for (const auto& [label, value] : summary.labels) document["labels"][label] = value;
-  return json_text(document);
+  return document;
+}
+
+}  // namespace
+
+std::string log_summary_json(const LogSummary& summary) { return json_text(summary_json(summary)); }
+
+std::string log_summaries_json(const std::vector<std::pair<std::string, LogSummary>>& summaries) {
+  nlohmann::ordered_json files = nlohmann::ordered_json::array();
+  for (const auto& [file, summary] : summaries) {
+    nlohmann::ordered_json document{{"file", file}};
+    document.update(summary_json(summary));
+    files.push_back(std::move(document));
+  }
+  return json_text(nlohmann::ordered_json{{"files", std::move(files)}});
 }
 
 }  // namespace torsio

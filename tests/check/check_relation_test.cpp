@@ -1,10 +1,17 @@
 // Checks of the relation between input and torque: delay, scale, sign, change, other recordings.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "check/check_support.hpp"
+#include "data/csv/csv_table.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/data/mapping.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
@@ -271,6 +278,91 @@ TEST(CheckOffsets, NameTheRecordWithAnotherGain) {
   ASSERT_EQ(verdict_of(findings, "offsets"), Verdict::warn);
   EXPECT_EQ(first_of(findings, "offsets").recording, "third");
   EXPECT_NE(text_of(findings).find("times as steeply"), std::string::npos) << text_of(findings);
+}
+
+TEST(CheckOffsets, WarnWhereTheTorqueIsZeroAtADeflection) {
+  EXPECT_EQ(verdict_of(findings_of(alone(bench_recording("sound"))), "offsets"), Verdict::pass);
+  const auto findings = findings_of(alone(test::changed("gear_angle_rad", [](Channel& gear) {
+    for (double& angle : gear.values) angle += 0.05;
+  })));
+  ASSERT_EQ(verdict_of(findings, "offsets"), Verdict::warn) << text_of(findings);
+  EXPECT_NE(text_of(findings).find("torque_Nm is zero at spring_deflection_rad = 0.0"),
+            std::string::npos)
+      << text_of(findings);
+}
+
+/// A log that begins at rest without load, of encoders with that zero.
+std::string log_from_rest(double zero_rad) {
+  std::string text = "t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n";
+  Random random(6);
+  for (int row = 0; row < 6000; ++row) {
+    const double t = std::max(1e-3 * row - 0.3, 0.0);
+    const double twist = 0.03 * std::sin(4.0 * t) + 0.01 * std::sin(11.0 * t);
+    const double joint = 0.3 * std::sin(0.9 * t);
+    text += fmt::format("{:.3f},{:.7f},{:.7f},{:.4f}\n", 1e-3 * row, joint + twist + zero_rad,
+                        joint, 500.0 * twist + 0.05 * random.normal());
+  }
+  return text;
+}
+
+Dataset read_with(const std::string& mapping, const std::vector<double>& zeros_rad) {
+  Dataset dataset;
+  for (const double zero_rad : zeros_rad) {
+    const std::string name = fmt::format("boot{}.csv", dataset.records.size() + 1);
+    add_record(dataset,
+               std::move(measured_recordings(parse_csv(log_from_rest(zero_rad), name),
+                                             parse_mapping(mapping, "m.yaml"))
+                             .front()),
+               Role::train);
+  }
+  return dataset;
+}
+
+std::string zero_line_of(const std::string& text) {
+  const std::size_t begin = text.find("zero: [");
+  return begin == std::string::npos ? "" : text.substr(begin, text.find(']', begin) - begin + 1);
+}
+
+TEST(CheckOffsets, AreGoneWithTheLineThatTheWarningNames) {
+  const std::string none = "drop: []";
+  const auto one = findings_of(read_with(none, {0.2}));
+  ASSERT_EQ(verdict_of(one, "offsets"), Verdict::warn) << text_of(one);
+  EXPECT_NE(first_of(one, "offsets").advice.find("incremental encoder"), std::string::npos);
+  const std::string line = zero_line_of(first_of(one, "offsets").advice);
+  EXPECT_EQ(verdict_of(findings_of(read_with(line, {0.2})), "offsets"), Verdict::pass) << line;
+
+  const auto two = findings_of(read_with(none, {0.0, 0.004}));
+  ASSERT_EQ(verdict_of(two, "offsets"), Verdict::warn) << text_of(two);
+  EXPECT_NE(text_of(two).find("as if spring_deflection_rad were "), std::string::npos)
+      << text_of(two);
+  const std::string of_two = zero_line_of(first_of(two, "offsets").advice);
+  EXPECT_EQ(verdict_of(findings_of(read_with(of_two, {0.0, 0.004})), "offsets"), Verdict::pass)
+      << of_two;
+}
+
+TEST(CheckPosition, IsNotExaminedWhereTheJointHardlyMoves) {
+  const Recording sound = bench_recording("sound");
+  EXPECT_EQ(first_of(findings_of(alone(sound)), "position").message,
+            "the torque does not depend on the angle of the joint");
+  // The joint moves with its load, and the ratio is wrong by a third: no other check finds it.
+  std::string text = "t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n";
+  for (int row = 0; row < 8000; ++row) {
+    const double t = 1e-3 * row;
+    const double torque = 25.0 * std::sin(1.9 * t) + 6.0 * std::sin(4.1 * t);
+    text += fmt::format("{:.3f},{:.7f},{:.7f},{:.4f}\n", t,
+                        80.0 / 60.0 * (torque / 300.0 + torque / 350.0), torque / 300.0, torque);
+  }
+  Dataset dataset;
+  add_record(dataset,
+             std::move(measured_recordings(parse_csv(text, "elastic.csv"),
+                                           parse_mapping("drop: []", "m.yaml"))
+                           .front()),
+             Role::train);
+  const Finding position = first_of(findings_of(dataset), "position");
+  EXPECT_EQ(position.verdict, Verdict::pass);
+  EXPECT_TRUE(position.message.starts_with("not examined: the joint moves too little, "))
+      << position.message;
+  EXPECT_NE(position.advice.find("without load"), std::string::npos) << position.advice;
 }
 
 TEST(CheckOffsets, FailWhereAZeroIsFurtherAwayThanTheTorqueReaches) {

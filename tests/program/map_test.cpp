@@ -71,5 +71,51 @@ TEST_F(MapVerb, ListsTheColumnsOfALogThatCheckCannotRead) {
   EXPECT_EQ(json.at("columns").at(5).at("unit"), "Nm");
 }
 
+TEST_F(MapVerb, ListsSeveralFilesAndStatesHowToListOne) {
+  folder_.file("a.csv", "t_s,q_rad\n0,1\n0.1,2\n0.2,3\n");
+  folder_.file("b.csv", "t_s,tau_Nm\n0,1\n0.1,2\n0.2,3\n");
+  const Outcome none = torsio("check --list");
+  EXPECT_EQ(none.exit_code, kCallWasWrong);
+  EXPECT_NE(none.err.find("such as  torsio check --list log.csv"), std::string::npos) << none.err;
+  const Outcome both = torsio("check --list a.csv b.csv");
+  ASSERT_EQ(both.exit_code, 0) << both.err;
+  for (const char* const part : {"a.csv:\n", "b.csv:\n", "q_rad", "tau_Nm"})
+    EXPECT_NE(both.out.find(part), std::string::npos) << both.out;
+  const auto json = nlohmann::json::parse(torsio("check --list a.csv b.csv --json -").out);
+  EXPECT_EQ(json.at("files").at(1).at("file"), "b.csv");
+  EXPECT_EQ(json.at("files").at(1).at("columns").at(1).at("column"), "tau_Nm");
+}
+
+TEST_F(MapVerb, TakesSeveralLogsOfOneJoint) {
+  record();
+  ASSERT_EQ(shell("cp log.csv free.csv").exit_code, 0);
+  const Outcome draft = torsio("map log.csv free.csv -o mapping.yaml");
+  ASSERT_EQ(draft.exit_code, 0) << draft.err;
+  EXPECT_NE(draft.err.find("next  torsio check log.csv free.csv --mapping mapping.yaml"),
+            std::string::npos)
+      << draft.err;
+  EXPECT_EQ(torsio("map log.csv sweep.csv").exit_code, kWorkFailed);
+}
+
+TEST_F(MapVerb, AnAngleBeforeTheGearIsNamedInTheMessage) {
+  record();
+  folder_.file(
+      "m.yaml",
+      "channels: {t_s: {from: Zeit, unit: s}, motor_angle_rad: {from: theta_m, unit: rad}, "
+      "joint_angle_rad: {from: pos_link, unit: rad}, torque_Nm: {from: Drehmoment, unit: "
+      "Nm}}\n");
+  const Outcome refused = torsio("check log.csv --mapping m.yaml");
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_NE(refused.err.find("motor_angle_rad is before the gear. In the mapping, name it "
+                             "gear_angle_rad and state the ratio"),
+            std::string::npos)
+      << refused.err;
+  ASSERT_EQ(shell("sed -i 's/motor_angle_rad: {from: theta_m, unit: rad/gear_angle_rad: {from: "
+                  "theta_m, unit: rad, gear_ratio: 120/' m.yaml")
+                .exit_code,
+            0);
+  EXPECT_EQ(torsio("check log.csv --mapping m.yaml").exit_code, 0);
+}
+
 }  // namespace
 }  // namespace torsio::test

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/data_flags.hpp"
@@ -128,15 +129,26 @@ Checked checked(const CheckFlags& flags) {
 
 /// Topics and fields instead of findings: what a mapping can name.
 void list(CheckFlags& flags) {
-  if (flags.data.recordings.size() != 1)
-    throw torsio::UsageError({.place = "--list", .expected = "one recording"});
+  const std::vector<std::string>& files = flags.data.recordings;
+  if (files.empty())
+    throw torsio::UsageError({.place = "--list",
+                              .expected = "a recording to list, such as  torsio check --list "
+                                          "log.csv",
+                              .found = "none"});
   flags.data.check_outputs({flags.json.destination}, flags.test);
-  const torsio::LogSummary summary = [&] {
-    ProgressBar progress;
-    return torsio::list_log(flags.data.recordings.front(), progress.listener());
-  }();
-  if (flags.json.wants_tables()) print(torsio::log_summary_text(summary));
-  flags.json.write(torsio::log_summary_json(summary));
+  std::vector<std::pair<std::string, torsio::LogSummary>> summaries;
+  for (const std::string& file : files) {
+    torsio::LogSummary summary = [&] {
+      ProgressBar progress;
+      return torsio::list_log(file, progress.listener());
+    }();
+    if (flags.json.wants_tables())
+      print((files.size() == 1 ? "" : fmt::format("{}{}:\n", summaries.empty() ? "" : "\n", file)) +
+            torsio::log_summary_text(summary));
+    summaries.emplace_back(file, std::move(summary));
+  }
+  flags.json.write(files.size() == 1 ? torsio::log_summary_json(summaries.front().second)
+                                     : torsio::log_summaries_json(summaries));
 }
 
 void run(CheckFlags& flags) {
