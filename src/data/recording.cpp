@@ -76,4 +76,19 @@ void Recording::add_condition(std::string name, double value) {
   conditions_.push_back(std::move(name));
 }
 
+Recording Recording::part(std::size_t begin, std::size_t end) const {
+  Recording result = *this;
+  result.start_s_ = time_s(begin);
+  const auto cut = [&](auto& values) {
+    if (values.empty()) return;
+    values.erase(values.begin() + static_cast<std::ptrdiff_t>(end), values.end());
+    values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(begin));
+  };
+  for (Channel& channel : result.channels_) {
+    cut(channel.values);
+    cut(channel.fresh);
+  }
+  return result;
+}
+
 }  // namespace torsio

@@ -49,17 +49,18 @@ std::string label_of(const ModelChoice& choice) {
       {.family = choice.family, .variant = choice.variant(), .input_set = choice.input_set});
 }
 
-/// A share of the training samples in blocks that are spread over each record: a part of each of its
-/// motions, and long enough for a model with memory.
-std::vector<Segment> share_of(const std::vector<Segment>& segments, double share,
-                              double sample_rate_Hz) {
-  constexpr double kLeastBlock_s = 2.0;
+/// A record whose training samples are cut to a share, in blocks that are spread over them: a part of
+/// each of its motions, long enough for a model with memory. Each block is a record of its own, since
+/// a model is run through all samples of a record. The samples of other roles stay as they are.
+void add_share_of(const DatasetRecord& record, double share, std::vector<DatasetRecord>& records) {
+  constexpr double kLeastBlock_s = 10.0;
   constexpr std::size_t kMaxBlocks = 4;
-  const auto least = static_cast<std::size_t>(std::ceil(kLeastBlock_s * sample_rate_Hz));
-  std::vector<Segment> cut;
-  for (const Segment& segment : segments) {
+  const auto least =
+      static_cast<std::size_t>(std::ceil(kLeastBlock_s * record.recording.sample_rate_Hz()));
+  DatasetRecord others{.recording = record.recording, .segments = {}};
+  for (const Segment& segment : record.segments) {
     if (segment.role != Role::train) {
-      cut.push_back(segment);
+      others.segments.push_back(segment);
       continue;
     }
     const std::size_t samples = segment.end - segment.begin;
@@ -67,10 +68,11 @@ std::vector<Segment> share_of(const std::vector<Segment>& segments, double share
     const std::size_t blocks = std::clamp<std::size_t>(kept / least, 1, kMaxBlocks);
     for (std::size_t b = 0; b < blocks; ++b) {
       const std::size_t begin = segment.begin + b * samples / blocks;
-      cut.push_back({.begin = begin, .end = begin + kept / blocks, .role = Role::train});
+      records.push_back({.recording = record.recording.part(begin, begin + kept / blocks),
+                         .segments = whole_record(kept / blocks, Role::train)});
     }
   }
-  return cut;
+  if (!others.segments.empty()) records.push_back(std::move(others));
 }
 
 std::size_t samples_to_train_on(const Dataset& dataset) {
@@ -263,9 +265,12 @@ class StructureStudy::Plan {
     if (known) return known;
     Dataset dataset = dataset_;
     folds_.cut(fold, dataset);
-    if (step < kLastStep)
-      for (DatasetRecord& record : dataset.records)
-        record.segments = share_of(record.segments, effort_of(step), dataset.sample_rate_Hz());
+    if (step < kLastStep) {
+      std::vector<DatasetRecord> records;
+      for (const DatasetRecord& record : dataset.records)
+        add_share_of(record, effort_of(step), records);
+      dataset.records = std::move(records);
+    }
     known = std::make_shared<FoldData>(std::move(dataset), settings_.allow_leak);
     return known;
   }

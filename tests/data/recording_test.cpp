@@ -32,6 +32,14 @@ TEST(Recording, DistinguishesNewSamplesFromHeldOnes) {
   EXPECT_TRUE(recording.channel("torque_Nm").is_fresh(2));
 }
 
+TEST(Recording, APartHasItsSamplesAndItsTime) {
+  const Recording part = short_recording().part(1, 3);
+  EXPECT_EQ(part.size(), 2U);
+  EXPECT_DOUBLE_EQ(part.time_s(0), short_recording().time_s(1));
+  EXPECT_EQ(part.channel("angle_rad").values, (std::vector<double>{0.1, 0.2}));
+  EXPECT_EQ(part.channel("torque_Nm").fresh, (std::vector<std::uint8_t>{0, 1}));
+}
+
 TEST(Recording, AnUnknownChannelIsAnErrorThatListsTheKnownOnes) {
   try {
     static_cast<void>(short_recording().channel("torqe_Nm"));

@@ -8,7 +8,7 @@
 #include <atomic>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
+#include <set>
 
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
@@ -112,13 +112,28 @@ TEST(StructureSearch, ShortRecordingsAreNotHalved) {
   EXPECT_EQ(by_status(search, "").contains("pruned"), false);
 }
 
-TEST(StructureSearch, AFitThatFailsOnAPartOfTheSamplesGoesOn) {
-  // A quarter of 4 s is one way of the motion, from which no branches can be learned.
-  const Dataset dataset = three_recordings(4000);
-  const StructureSearch search = search_structures(
-      dataset, model_choices(dataset, "maxwell_slip:thresholds=2,maxwell_slip:thresholds=4", {}),
+TEST(StructureStudy, AFitThatFailsOnAPartOfTheSamplesContinues) {
+  StructureStudy kind(
+      three_recordings(),
+      model_choices(three_recordings(),
+                    "polynomial:degree=1,polynomial:degree=2,polynomial:degree=3", {}),
       {});
-  EXPECT_EQ(by_status(search, ""), (std::map<std::string, int>{{"ok", 2}}));
+  std::vector<TrialRecord> records;
+  const std::vector<Trial> trials = kind.first_trials();
+  ASSERT_THAT(trials, SizeIs(3));
+  for (const double value : {0.3, kNotMeasured, 0.2}) {
+    TrialRecord& record = records.emplace_back();
+    record.id = static_cast<std::int64_t>(records.size());
+    record.trial = trials[records.size() - 1];
+    record.result.value = value;
+  }
+  const HalvingDecision decision = kind.decide("polynomial", 0, records);
+  ASSERT_THAT(decision.pruned, SizeIs(1));
+  EXPECT_EQ(decision.pruned[0].trial, 1);
+  EXPECT_THAT(decision.pruned[0].reason, HasSubstr("RMSE 0.3, place 2 of 2"));
+  std::set<std::string> next;
+  for (const Trial& trial : decision.next) next.insert(trial.key.substr(0, trial.key.find('|')));
+  EXPECT_EQ(next, (std::set<std::string>{"polynomial[degree=2]", "polynomial[degree=3]"}));
 }
 
 TEST(StructureSearch, AWrongSettingEndsIt) {

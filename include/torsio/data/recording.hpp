@@ -70,6 +70,9 @@ class Recording {
   void add_condition(std::string name, double value);
   [[nodiscard]] const std::vector<std::string>& conditions() const noexcept { return conditions_; }
 
+  /// A recording of the samples [begin, end) alone, with all that is known about this one.
+  [[nodiscard]] Recording part(std::size_t begin, std::size_t end) const;
+
   Source source;
   /// Channels of this recording that a mapping computed from others, so that a model's inputs go
   /// back to measured ones.
