@@ -393,6 +393,16 @@ double estimator_rate_Hz(const ModelFile& model) {
   return is_whole ? model.settings.sample_rate_Hz : kBenchRate_Hz;
 }
 
+/// One sentence, without the place and the advice of the error.
+std::string reason_of(const ErrorReport& report) {
+  std::string reason = "the model has no inverse";
+  for (const auto& [word, part] : {std::pair(": ", &report.problem),
+                                   {": expected ", &report.expected},
+                                   {", found ", &report.found}})
+    if (!part->empty()) reason += word + part->substr(0, part->find('\n'));
+  return reason;
+}
+
 }  // namespace
 
 ImpedanceModel impedance_model(std::string name, const ModelFile& model, const DataSheet& sheet) {
@@ -402,7 +412,7 @@ ImpedanceModel impedance_model(std::string name, const ModelFile& model, const D
       AnyInverse inverse = inverse_of(model);
       return {.name = std::move(name), .use = std::move(inverse)};
     } catch (const Error& error) {
-      reason = error.what();
+      reason = reason_of(error.report());
     }
   }
   Estimator estimator = make_estimator(model, estimator_rate_Hz(model));

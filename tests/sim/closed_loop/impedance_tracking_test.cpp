@@ -347,7 +347,8 @@ TEST(ImpedanceTracking, AModelWithoutAnInverseCorrectsTheTorqueOfASpring) {
   const Dataset dataset = recordings_of("dfki-50", {.experiment = "chirp", .duration_s = 20.0}, 1);
   const ImpedanceModel model = impedance_model("net", model_of(dataset, "mlp", {}), sheet);
   EXPECT_EQ(model.name, "net");
-  EXPECT_NE(model.reason, "");
+  EXPECT_TRUE(model.reason.starts_with("the model has no inverse: ")) << model.reason;
+  EXPECT_EQ(model.reason.find('\n'), std::string::npos) << model.reason;
   const ImpedanceRun run = track_impedance(sheet,
                                            {.kind = ImpedanceSpec::Kind::wanted,
                                             .stiffness_Nm_rad = 100.0,
