@@ -46,7 +46,8 @@ RequestJson request_json(const SearchRequest& request) {
           {"folds", request.settings.folds},
           {"seed", request.settings.seed},
           {"allow_leak", request.settings.allow_leak},
-          {"halving", static_cast<int>(request.settings.halving)}};
+          {"halving", static_cast<int>(request.settings.halving)},
+          {"halve_from_s", request.settings.halve_from_s}};
 }
 
 SearchRequest request_from(const RequestJson& json) {
@@ -63,7 +64,8 @@ SearchRequest request_from(const RequestJson& json) {
   request.settings = {.folds = json.at("folds"),
                       .seed = json.at("seed"),
                       .allow_leak = json.at("allow_leak"),
-                      .halving = static_cast<Halving>(json.at("halving").get<int>())};
+                      .halving = static_cast<Halving>(json.at("halving").get<int>()),
+                      .halve_from_s = json.at("halve_from_s")};
   return request;
 }
 

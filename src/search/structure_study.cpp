@@ -29,6 +29,36 @@ using Json = nlohmann::json;
 constexpr auto kEfforts = std::to_array<double>({0.25, 0.5});
 constexpr int kLastStep = static_cast<int>(kEfforts.size());
 
+/// The option that limits how long a family's fit searches. Where there is one, a halving step cuts
+/// it and not the samples, so that the fit is of all motions of the recordings.
+struct EffortOption {
+  std::string_view family;
+  std::string_view option;
+};
+constexpr auto kEffortOptions = std::to_array<EffortOption>({{"hammerstein_wiener", "iterations"},
+                                                             {"mlp", "epochs"},
+                                                             {"narx_parametric_gp", "updates"},
+                                                             {"parametric_gp", "updates"}});
+
+/// The name of that option; empty: the family has none.
+std::string_view effort_option_of(std::string_view family) {
+  const auto* const found = std::ranges::find(kEffortOptions, family, &EffortOption::family);
+  return found == kEffortOptions.end() ? std::string_view() : found->option;
+}
+
+/// A candidate whose search is cut to a share.
+ModelChoice with_effort(ModelChoice choice, double effort) {
+  const std::string option(effort_option_of(choice.family));
+  const auto& options = find_family(choice.family).options;
+  const auto known = std::ranges::find(options, option, &OptionInfo::name);
+  const auto given = choice.options.find(option);
+  const std::string full =
+      given == choice.options.end() ? std::string(known->default_value) : given->second;
+  const double cut = std::max(1.0, std::round(effort * std::stod(full)));
+  choice.options[option] = fmt::format("{:.0f}", cut);
+  return choice;
+}
+
 /// What a trial fits: a candidate on a fold.
 struct FitTask {
   std::size_t candidate = 0;
@@ -110,15 +140,17 @@ class StructureStudy::Plan {
     for (std::size_t i = 0; i < candidates_.size(); ++i) groups[group_of(i)].push_back(i);
     std::vector<Trial> trials;
     for (const auto& [group, members] : groups)
-      std::ranges::move(trials_of(members, is_halved(members.size()) ? 0 : kLastStep),
+      std::ranges::move(trials_of(members, is_halved(members) ? 0 : kLastStep),
                         std::back_inserter(trials));
     return trials;
   }
 
   TrialResult run(const Claim& claim, const Progress& progress) {
     const FitTask task = task_of(claim.spec);
-    const ModelChoice& choice = candidates_.at(task.candidate);
-    const std::shared_ptr<FoldData> data = data_of(task.fold, claim.step);
+    const ModelChoice& full = candidates_.at(task.candidate);
+    const bool cuts_search = claim.step < kLastStep && !effort_option_of(full.family).empty();
+    const ModelChoice choice = cuts_search ? with_effort(full, effort_of(claim.step)) : full;
+    const std::shared_ptr<FoldData> data = data_of(task.fold, cuts_search ? kLastStep : claim.step);
     ScoredModel scored =
         fit_and_score(data->dataset, data->inputs, choice, settings_.seed, kFoldRoles, progress);
     std::erase_if(scored.rows, [](const ResultRow& row) { return row.split == Role::train; });
@@ -169,10 +201,10 @@ class StructureStudy::Plan {
       } else {
         decision.pruned.push_back(
             {entry.record->id,
-             fmt::format("halving step {}, {:.0f} % of the samples of one fold: RMSE {:.3g}, place "
-                         "{} of {} (the last that continued: {:.3g})",
-                         step + 1, 100.0 * effort_of(step), entry.value, i + 1, fitted,
-                         entries[kept - 1].value)});
+             fmt::format("halving step {}, one fold with {:.0f} % of the {}: RMSE {:.3g}, place {} "
+                         "of {} (the last that continued: {:.3g})",
+                         step + 1, 100.0 * effort_of(step), what_is_cut(entry.candidate),
+                         entry.value, i + 1, fitted, entries[kept - 1].value)});
       }
     }
     const int next_step = step + 1 < kLastStep && next.size() > 2 ? step + 1 : kLastStep;
@@ -233,9 +265,24 @@ class StructureStudy::Plan {
     return settings_.halving == Halving::by_all ? "all" : candidates_[candidate].family;
   }
 
-  [[nodiscard]] bool is_halved(std::size_t members) const {
+  [[nodiscard]] bool is_halved(const std::vector<std::size_t>& members) const {
     constexpr std::size_t kLeastSamples = 8000;  // a quarter of which is enough for most families
-    return settings_.halving != Halving::off && members > 1 && samples_ >= kLeastSamples;
+    if (settings_.halving == Halving::off || members.size() < 2 || samples_ < kLeastSamples)
+      return false;
+    return settings_.halving == Halving::by_all ||
+           expected_s(members.front(), kLastStep) >= settings_.halve_from_s;
+  }
+
+  /// The expected time of a fit.
+  [[nodiscard]] double expected_s(std::size_t candidate, int step) const {
+    constexpr double kSamplesOfTypicalTime = 85'000.0;
+    return find_family(candidates_[candidate].family).typical_fit_s * effort_of(step) *
+           static_cast<double>(samples_) / kSamplesOfTypicalTime;
+  }
+
+  [[nodiscard]] std::string what_is_cut(std::size_t candidate) const {
+    const std::string_view option = effort_option_of(candidates_[candidate].family);
+    return option.empty() ? "training samples" : std::string(option);
   }
 
   [[nodiscard]] static double effort_of(int step) {
@@ -244,7 +291,6 @@ class StructureStudy::Plan {
 
   [[nodiscard]] std::vector<Trial> trials_of(const std::vector<std::size_t>& members,
                                              int step) const {
-    constexpr double kSamplesOfTypicalTime = 85'000.0;
     std::vector<Trial> trials;
     const std::size_t folds = step < kLastStep ? 1 : folds_.plan().folds.size();
     for (const std::size_t i : members)
@@ -254,8 +300,7 @@ class StructureStudy::Plan {
              .spec = Json{{"candidate", i}, {"fold", fold}}.dump(),
              .group = group_of(i),
              .step = step,
-             .priority = find_family(candidates_[i].family).typical_fit_s * effort_of(step) *
-                         static_cast<double>(samples_) / kSamplesOfTypicalTime});
+             .priority = expected_s(i, step)});
     return trials;
   }
 

@@ -106,17 +106,24 @@ class Workers {
 
   void work() {
     auto pause = kPoll;
+    auto last_claim = Clock::now();
     while (!stop_) {
       const std::optional<Claim> claim = store_.claim(study_.id, options_.name, options_.lease_s);
       if (claim) {
         run_trial(*claim);
         advance();
         pause = kPoll;
+        last_claim = Clock::now();
         continue;
       }
       if (advance()) continue;
-      if (!options_.until_complete && !may_get_more()) return;
-      if (store_.counts(study_.id).is_complete() && !advance()) return;
+      const StudyCounts counts = store_.counts(study_.id);
+      if (counts.is_complete() && !advance()) return;
+      // Others run the rest. One of them that was killed loses its trial within a lease.
+      constexpr double kPatience = 1.5;
+      if (!options_.until_complete && counts.waiting == 0 && !may_get_more() &&
+          seconds_since(last_claim) > kPatience * options_.lease_s)
+        return;
       std::unique_lock lock(guard_);
       changed_.wait_for(lock, pause, [this] { return stop_.load(); });
       pause = std::min(2 * pause, kLongestPoll);

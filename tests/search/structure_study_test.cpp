@@ -67,9 +67,12 @@ TEST(StructureSearch, WithoutHalvingItIsTheCrossValidation) {
 TEST(StructureSearch, IsTheSameForAnyNumberOfThreads) {
   const Dataset dataset = three_recordings();
   const auto choices = model_choices(dataset, kModels, {});
-  const std::string alone = table_of(search_structures(dataset, choices, {}, {}, 1).scores);
-  EXPECT_EQ(alone, table_of(search_structures(dataset, choices, {}, {}, 2).scores));
-  EXPECT_EQ(alone, table_of(search_structures(dataset, choices, {}, {}, 5).scores));
+  const std::string alone =
+      table_of(search_structures(dataset, choices, {.halve_from_s = 0.0}, {}, 1).scores);
+  EXPECT_EQ(alone,
+            table_of(search_structures(dataset, choices, {.halve_from_s = 0.0}, {}, 2).scores));
+  EXPECT_EQ(alone,
+            table_of(search_structures(dataset, choices, {.halve_from_s = 0.0}, {}, 5).scores));
 }
 
 std::map<std::string, int> by_status(const StructureSearch& search, const std::string& family) {
@@ -83,7 +86,7 @@ TEST(StructureSearch, HalvingKeepsTheBetterHalfOfEachFamilyAndStatesWhy) {
   const Dataset dataset = three_recordings();
   const auto choices = model_choices(dataset, kModels, {});
   const StructureSearch all = search_structures(dataset, choices, {.halving = Halving::off});
-  const StructureSearch halved = search_structures(dataset, choices, {});
+  const StructureSearch halved = search_structures(dataset, choices, {.halve_from_s = 0.0});
   EXPECT_THAT(halved.winners, SizeIs(all.winners.size()));
   EXPECT_EQ(halved.winners.front().family, all.winners.front().family);
   EXPECT_EQ(halved.winners.front().variant(), all.winners.front().variant());
@@ -105,11 +108,26 @@ TEST(StructureSearch, HalvingOfAllMayLoseFamiliesButKeepsTheBest) {
   EXPECT_EQ(halved.winners.front().variant(), all.winners.front().variant());
 }
 
+TEST(StructureSearch, QuickFamiliesAreNotHalved) {
+  const Dataset dataset = three_recordings();
+  const StructureSearch search =
+      search_structures(dataset, model_choices(dataset, kModels, {}), {});
+  EXPECT_FALSE(by_status(search, "").contains("pruned"));
+}
+
+TEST(StructureSearch, TheSearchOfAFitIsCutWhereItHasALimit) {
+  const Dataset dataset = three_recordings();
+  const auto choices = model_choices(dataset, "mlp:layers=2,mlp:layers=8-8", {});
+  const StructureSearch search = search_structures(dataset, choices, {.halve_from_s = 0.0});
+  EXPECT_EQ(by_status(search, ""), (std::map<std::string, int>{{"ok", 1}, {"pruned", 1}}));
+  EXPECT_THAT(search.scores.ranking.back().reason, HasSubstr("25 % of the epochs"));
+}
+
 TEST(StructureSearch, ShortRecordingsAreNotHalved) {
   const Dataset dataset = three_recordings(2500);
   const StructureSearch search =
-      search_structures(dataset, model_choices(dataset, kModels, {}), {});
-  EXPECT_EQ(by_status(search, "").contains("pruned"), false);
+      search_structures(dataset, model_choices(dataset, kModels, {}), {.halve_from_s = 0.0});
+  EXPECT_FALSE(by_status(search, "").contains("pruned"));
 }
 
 TEST(StructureStudy, AFitThatFailsOnAPartOfTheSamplesContinues) {
@@ -117,7 +135,7 @@ TEST(StructureStudy, AFitThatFailsOnAPartOfTheSamplesContinues) {
       three_recordings(),
       model_choices(three_recordings(),
                     "polynomial:degree=1,polynomial:degree=2,polynomial:degree=3", {}),
-      {});
+      {.halve_from_s = 0.0});
   std::vector<TrialRecord> records;
   const std::vector<Trial> trials = kind.first_trials();
   ASSERT_THAT(trials, SizeIs(3));
@@ -161,6 +179,7 @@ class KeptStudy : public testing::Test {
       write_recording(record.recording, request_.recordings.back());
     }
     request_.models = kModels;
+    request_.settings.halve_from_s = 0.0;
   }
 
   [[nodiscard]] StudyStore store() const {
@@ -199,8 +218,10 @@ TEST_F(KeptStudy, AStoppedStudyGoesOnWithoutRepeatingATrial) {
   EXPECT_EQ(report.finished, trials.size() - kDone);
   for (const TrialRecord& trial : trials) EXPECT_EQ(trial.attempt, 1) << trial.trial.key;
   const Dataset dataset = load_search_data(request_);
-  EXPECT_EQ(table_of(again->result(second, study.id).scores),
-            table_of(search_structures(dataset, search_choices(dataset, request_), {}).scores));
+  EXPECT_EQ(
+      table_of(again->result(second, study.id).scores),
+      table_of(
+          search_structures(dataset, search_choices(dataset, request_), request_.settings).scores));
 }
 
 TEST_F(KeptStudy, ARecordingThatChangedIsRefused) {

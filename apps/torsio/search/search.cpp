@@ -252,7 +252,8 @@ void add_search(CLI::App& app) {
                    "or families with settings: linear,mlp:layers=8,mlp:layers=16-16")
       ->capture_default_str();
   verb->add_option("--halving", flags->halving,
-                   "family: structures are fitted on a part of the samples first, and the better "
+                   "family: structures of families that are slow to fit are fitted in part first, "
+                   "and the better "
                    "half of each family continues; all: of all families together; off: each is "
                    "fitted on every fold")
       ->check(CLI::IsMember({"family", "all", "off"}))

@@ -28,6 +28,9 @@ struct SearchSettings {
   std::uint64_t seed = 1;
   bool allow_leak = false;
   Halving halving = Halving::by_family;
+  /// A family is halved if one of its fits is expected to take this long: pruning quick ones saves
+  /// nothing and may lose its best. It does not apply to `Halving::by_all`.
+  double halve_from_s = 1.0;
 };
 
 /// All that a worker on another machine needs to run the trials of a search: its files are read by
@@ -55,10 +58,11 @@ struct SearchRequest {
 
 /// A search over structures as a study: a trial fits one candidate on one fold.
 ///
-/// Halving steps, if wanted: the candidates of a group are fitted on a quarter of the first fold's
-/// training samples, in blocks that are spread over each record, and the better half by RMSE on its
-/// held-out part is fitted on half of them, while more than two are left; the better half of these
-/// on all samples of all folds. A candidate whose fit fails on a part of the samples continues. A
+/// Halving steps, if wanted: the candidates of a group are fitted on the first fold with a quarter of
+/// the iterations, epochs or updates of the family's fit or, where it has none, of the training
+/// samples, in blocks that are spread over each record. The better half by RMSE on the held-out part
+/// is fitted with half of them, while more than two are left; the better half of these with all, on
+/// all folds. A candidate whose fit fails on a part of the samples continues. A
 /// group of one candidate, and recordings too short to be cut, begin with the last step. Which
 /// candidates continue depends on the errors alone, not on the order in which the trials end.
 class StructureStudy : public StudyKind {

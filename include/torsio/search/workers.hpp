@@ -16,8 +16,8 @@ struct WorkerOptions {
   /// A worker that is not heard of for this time loses its trial. A third of it passes between two
   /// extensions.
   double lease_s = 60.0;
-  /// Return only when every trial of the study has finished, also those of other workers; else as
-  /// soon as none is left to claim.
+  /// Return only when every trial of the study has finished, also those of other workers; else when
+  /// none could be claimed for one and a half leases: those of a worker that was killed can be.
   bool until_complete = true;
   /// Which worker this is, in the store; empty: host and number of the process.
   std::string name = {};
