@@ -1,4 +1,4 @@
-#include "torsio/search/specimen_study.hpp"
+#include "search/specimen_study.hpp"
 
 #include <fmt/format.h>
 

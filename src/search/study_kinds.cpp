@@ -1,9 +1,9 @@
-#include "torsio/search/study_kinds.hpp"
+#include "search/study_kinds.hpp"
 
 #include <fmt/format.h>
 
+#include "search/specimen_study.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/search/specimen_study.hpp"
 #include "torsio/search/structure_study.hpp"
 
 namespace torsio {

@@ -1,4 +1,4 @@
-#include "torsio/search/specimen_study.hpp"
+#include "search/specimen_study.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

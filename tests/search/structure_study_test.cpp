@@ -10,12 +10,12 @@
 #include <map>
 #include <set>
 
+#include "search/study_kinds.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/write.hpp"
-#include "torsio/search/study_kinds.hpp"
 #include "torsio/search/workers.hpp"
 
 namespace torsio {

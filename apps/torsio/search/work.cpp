@@ -9,9 +9,9 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "search/study_flags.hpp"
+#include "search/study_kinds.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
-#include "torsio/search/study_kinds.hpp"
 #include "verbs.hpp"
 
 namespace {
