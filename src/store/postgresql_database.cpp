@@ -5,6 +5,7 @@
 #if TORSIO_HAS_POSTGRESQL
 #include <libpq-fe.h>
 
+#include <array>
 #include <charconv>
 #include <map>
 
@@ -119,12 +120,12 @@ class PostgresqlDatabase final : public Database {
 
  private:
   void connect() {
-    const char* const keywords[] = {"dbname",           "application_name", "connect_timeout",
-                                    "keepalives",       "keepalives_idle",  "keepalives_interval",
-                                    "keepalives_count", "client_encoding",  nullptr};
-    const char* const values[] = {url_.c_str(), "torsio", "10",   "1",    "20",
-                                  "5",          "3",      "UTF8", nullptr};
-    connection_.reset(PQconnectdbParams(keywords, values, 1));
+    constexpr auto kKeywords = std::to_array<const char*>(
+        {"dbname", "application_name", "connect_timeout", "keepalives", "keepalives_idle",
+         "keepalives_interval", "keepalives_count", "client_encoding", nullptr});
+    const auto values = std::to_array<const char*>(
+        {url_.c_str(), "torsio", "10", "1", "20", "5", "3", "UTF8", nullptr});
+    connection_.reset(PQconnectdbParams(kKeywords.data(), values.data(), 1));
     if (PQstatus(connection_.get()) != CONNECTION_OK) refuse_connection();
     PQsetNoticeProcessor(
         connection_.get(), [](void*, const char*) {}, nullptr);

@@ -13,7 +13,7 @@
 namespace torsio {
 namespace {
 
-constexpr int kBusyTimeout_ms = 60'000;
+constexpr int kBusyTimeout_s = 60;
 
 struct CloseSqlite {
   void operator()(sqlite3* database) const noexcept { sqlite3_close_v2(database); }
@@ -136,7 +136,7 @@ class SqliteDatabase final : public Database {
         sqlite3_open_v2(path, &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
     database_.reset(opened);
     if (code != SQLITE_OK) fail();
-    sqlite3_busy_timeout(opened, kBusyTimeout_ms);
+    sqlite3_busy_timeout(opened, 1000 * kBusyTimeout_s);
     sqlite3_extended_result_codes(opened, 1);
   }
 
@@ -215,8 +215,7 @@ class SqliteDatabase final : public Database {
         report.advice = "Use --store FILE with another name.";
         break;
       case SQLITE_BUSY:
-        report.problem =
-            fmt::format("another program has held the store for {} s", kBusyTimeout_ms / 1000);
+        report.problem = fmt::format("another program has held the store for {} s", kBusyTimeout_s);
         report.advice = "End that program, and start the command again: it continues.";
         break;
       case SQLITE_IOERR:
