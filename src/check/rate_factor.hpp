@@ -11,8 +11,8 @@ struct RateFactor {
   double together = 0.0;  ///< their correlation
 };
 
-/// Both over the same windows of 0.1 s, so that noise and the steps of an encoder do not count; empty if they are not
-/// correlated.
+/// Both over the same windows of 0.1 s, so that noise and the steps of an encoder do not count; empty
+/// if they are not correlated.
 [[nodiscard]] std::optional<RateFactor> factor_of_rate(const std::vector<double>& speed,
                                                        const std::vector<double>& angle,
                                                        double sample_rate_Hz);

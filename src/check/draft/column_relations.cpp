@@ -72,14 +72,25 @@ Fitted fitted(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& motor) {
   return fit;
 }
 
-/// What the fit leaves over what one of two inputs moves without the other.
-double doubt_of(const Fitted& fit, Eigen::Index coefficient, const Eigen::VectorXd& input,
-                const Eigen::VectorXd& other) {
+/// How far one of two inputs moves without the other: the norm of what the other does not explain.
+double motion_alone(const Eigen::VectorXd& input, const Eigen::VectorXd& other) {
   const double squares = other.squaredNorm();
-  const Eigen::VectorXd alone =
-      squares > 0.0 ? Eigen::VectorXd(input - input.dot(other) / squares * other) : input;
-  const double moved = std::abs(fit.coefficients[coefficient]) * alone.norm();
+  if (!(squares > 0.0)) return input.norm();
+  const double alone = (input - input.dot(other) / squares * other).norm();
+  constexpr double kRounding = 1e-12;
+  return alone > kRounding * input.norm() ? alone : 0.0;
+}
+
+/// What the fit leaves over what one of two inputs moves without the other.
+double doubt_of(const Fitted& fit, Eigen::Index coefficient, double alone) {
+  const double moved = std::abs(fit.coefficients[coefficient]) * alone;
   return moved > 0.0 ? std::sqrt(fit.left) / moved : HUGE_VAL;
+}
+
+/// The standard error of a factor: the residuals over the motion that only this input has.
+double error_of(const Fitted& fit, double alone, std::size_t rows, std::size_t parameters) {
+  if (!(alone > 0.0) || rows <= parameters) return HUGE_VAL;
+  return std::sqrt(fit.left / static_cast<double>(rows - parameters)) / alone;
 }
 
 double width(const Eigen::VectorXd& values) { return values.maxCoeff() - values.minCoeff(); }
@@ -98,13 +109,18 @@ std::optional<GearFit> fit_gear(const std::vector<JointLog>& logs) {
   const double variance = (known.motor.array() - known.motor.mean()).square().sum();
   GearFit gear{.factor = fit.coefficients[1], .explained = 1.0 - fit.left / variance};
   const Eigen::VectorXd joint_values = known.inputs.col(1);
-  const double joint_variance = (joint_values.array() - joint_values.mean()).square().sum();
-  gear.error = std::sqrt(fit.left / static_cast<double>(rows - 2) / joint_variance);
   const Eigen::VectorXd torque_values = has_torque ? Eigen::VectorXd(known.inputs.col(2))
                                                    : Eigen::VectorXd::Zero(joint_values.size());
-  gear.doubt = doubt_of(fit, 1, joint_values, torque_values);
+  const double joint_alone = motion_alone(joint_values, torque_values);
+  gear.error = error_of(fit, joint_alone, rows, logs.size() + (has_torque ? 2 : 1));
+  gear.doubt = doubt_of(fit, 1, joint_alone);
+  gear.by_joint = 1.0 - with_joint.left / variance;
   if (has_torque) {
-    gear.doubt_of_torque = doubt_of(fit, 2, torque_values, joint_values);
+    const Eigen::VectorXd per_torque =
+        known.inputs.col(2) * (torque_values.dot(known.motor) / torque_values.squaredNorm());
+    const double left_by_torque = (known.motor - per_torque).squaredNorm();
+    gear.by_joint_alone = left_by_torque > 0.0 ? 1.0 - fit.left / left_by_torque : 0.0;
+    gear.doubt_of_torque = doubt_of(fit, 2, motion_alone(torque_values, joint_values));
     gear.together = joint_values.dot(torque_values) / (joint_values.norm() * torque_values.norm());
     gear.per_torque = fit.coefficients[2];
     gear.by_torque = with_joint.left > 0.0 ? 1.0 - fit.left / with_joint.left : 0.0;
@@ -112,10 +128,22 @@ std::optional<GearFit> fit_gear(const std::vector<JointLog>& logs) {
   return gear;
 }
 
+bool moves_with_joint(const GearFit& fit) {
+  constexpr double kMoves = 0.5;
+  if (fit.by_joint >= kMoves) return true;
+  return fit.by_joint_alone >= kMoves && shows_sign(fit);
+}
+
+bool shows_sign(const GearFit& fit) {
+  constexpr double kErrors = 5.0;
+  return std::abs(fit.factor) > kErrors * fit.error;
+}
+
 double plausible_ratio(const GearFit& fit) {
   constexpr double kNear = 0.003;
   constexpr double kErrors = 3.0;
   const double ratio = std::abs(fit.factor);
+  if (!(ratio > 0.0) || !std::isfinite(ratio)) return 0.0;
   const double whole = std::round(ratio);
   if (whole >= 1.0 && std::abs(ratio - whole) <= std::max(kNear * ratio, kErrors * fit.error))
     return whole;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 #include "check/draft/column_relations.hpp"
@@ -21,8 +22,7 @@ constexpr double kSomeDoubt = 0.01;      ///< up to here a ratio may be sure
 constexpr double kTogether = 0.9;        ///< correlation of joint and torque
 constexpr double kFreeTravel_rad = 1.0;  ///< five times what most springs of joints twist
 constexpr double kDoubtOfSign = 0.3;
-constexpr double kByTorque = 0.1;  ///< share of what is left that shows the torque's sign
-constexpr double kLargestRatio = 400.0;
+constexpr double kByTorque = 0.1;    ///< share of what is left that shows the torque's sign
 constexpr double kLeastRatio = 1.5;  ///< for an angle that is named after the gear
 constexpr double kSameSide = 0.1;    ///< a ratio that differs less from 1 is none
 
@@ -42,7 +42,7 @@ std::vector<double> moving(const DraftWork& work, const LogTable& table, std::si
 
 /// @param torque may be `kNone`
 std::vector<JointLog> logs_of(const DraftWork& work, std::size_t motor, std::size_t joint,
-                              std::size_t torque) {
+                              std::size_t torque = kNone) {
   std::vector<JointLog> logs;
   const auto add = [&](const LogTable& table) {
     logs.push_back(
@@ -94,8 +94,9 @@ Angles angles_by_width(DraftWork& work, Angles angles) {
     take_side(work, unknown.front(), Side::joint, Certainty::likely, "the only angle");
   } else if (unknown.size() == 2 && angles.before == kNone && angles.after == kNone) {
     const auto width = [&](std::size_t i) {
-      const ColumnSummary& summary = work.draft.columns[i].summary;
-      return summary.highest - summary.lowest;
+      const ColumnGuess& guess = work.draft.columns[i];
+      const Unit* const unit = find_unit(guess.unit);
+      return unit->scale * (guess.summary.highest - guess.summary.lowest);
     };
     const bool is_first = width(unknown[0]) >= width(unknown[1]);
     angles.before = unknown[is_first ? 0 : 1];
@@ -110,7 +111,7 @@ Angles angles_by_width(DraftWork& work, Angles angles) {
 
 /// The unit of the motor's angle in which the ratio is one that gears have; the present one otherwise.
 std::string_view unit_by_ratio(const ColumnGuess& motor, double factor) {
-  if (!motor.is_unit_by_range) return motor.unit;
+  if (!motor.assumption) return motor.unit;
   const double now = find_unit(motor.unit)->scale;
   std::vector<std::string_view> possible;
   for (const std::string_view unit : {"rad", "deg", "rev"}) {
@@ -162,8 +163,9 @@ void take_ratio(DraftWork& work, const Angles& angles, GearFit fit) {
   fit.factor *= change;
   fit.error *= change;
   const double ratio = plausible_ratio(fit);
-  if (unit != motor.unit) motor.certainty = Certainty::likely;
-  motor.unit = unit;
+  if (unit != motor.unit)
+    motor.replace_assumption(unit, Certainty::unsure,
+                             fmt::format("relation: only in {} is the ratio one of a gear", unit));
   if (fit.factor < 0.0) motor.sign = -motor.sign;
   std::string reason =
       fmt::format("relation: {:.5g} +- {:.1g} times '{}'", fit.factor, fit.error, joint);
@@ -199,29 +201,54 @@ void limit_without_torque(DraftWork& work, const Angles& angles) {
                                   : "");
 }
 
-void guess_sign_of_torque(DraftWork& work, const GearFit& fit, std::size_t torque) {
-  if (torque == kNone) return;
+void take_sign_of_torque(DraftWork& work, std::size_t torque, bool rises) {
   ColumnGuess& guess = work.draft.columns[torque];
-  if (std::abs(fit.together) > kTogether && fit.doubt_of_torque > kDoubtOfSign) {
-    guess.add(Certainty::unsure,
-              "relation: it moves together with the joint, which does not show its sign");
-    return;
-  }
-  if (fit.by_torque < kByTorque) return;
-  const bool rises = fit.per_torque * fit.factor > 0.0;
   if (!rises) guess.sign = -guess.sign;
   guess.add(rises ? Certainty::sure : Certainty::likely,
             rises ? "relation: rises with the deflection"
                   : "relation: falls with the deflection, so that its sign is inverted");
 }
 
-/// For a recorded deflection.
-void compare_with_deflection(DraftWork& work, std::size_t torque) {
+enum class SignOfTorque : std::uint8_t { shown, hidden_by_joint, not_shown };
+
+SignOfTorque sign_by_angles(DraftWork& work, const GearFit& fit, std::size_t torque) {
+  if (std::abs(fit.together) > kTogether && fit.doubt_of_torque > kDoubtOfSign)
+    return SignOfTorque::hidden_by_joint;
+  if (fit.by_torque < kByTorque || !shows_sign(fit)) return SignOfTorque::not_shown;
+  take_sign_of_torque(work, torque, fit.per_torque * fit.factor > 0.0);
+  return SignOfTorque::shown;
+}
+
+/// A recorded deflection. Where the angles show the sign of the torque, the deflection takes it over.
+/// @returns whether it shows the sign of the torque
+bool compare_with_deflection(DraftWork& work, std::size_t torque, bool is_sign_shown) {
   const std::vector<std::size_t> deflections = work.measured(Quantity::deflection);
-  if (torque == kNone || deflections.empty()) return;
-  const auto fit = fit_gear(logs_of(work, deflections.front(), torque, kNone));
-  if (!fit || fit->explained < kMovesTogether) return;
-  guess_sign_of_torque(work, {.factor = 1.0, .per_torque = fit->factor, .by_torque = 1.0}, torque);
+  if (deflections.empty()) return false;
+  const auto fit = fit_gear(logs_of(work, deflections.front(), torque));
+  if (!fit || fit->explained < kMovesTogether) return false;
+  const bool rises = fit->factor > 0.0;
+  if (!is_sign_shown) {
+    take_sign_of_torque(work, torque, rises);
+  } else if (!rises) {
+    ColumnGuess& deflection = work.draft.columns[deflections.front()];
+    deflection.sign = -deflection.sign;
+    deflection.add(Certainty::likely,
+                   "relation: opposite to the difference of the angles, so that its sign is "
+                   "inverted");
+  }
+  return true;
+}
+
+/// @param fit of the angles; null: they show nothing
+void guess_sign_of_torque(DraftWork& work, const GearFit* fit, std::size_t torque) {
+  if (torque == kNone) return;
+  const SignOfTorque by_angles =
+      fit != nullptr ? sign_by_angles(work, *fit, torque) : SignOfTorque::not_shown;
+  if (compare_with_deflection(work, torque, by_angles == SignOfTorque::shown)) return;
+  if (by_angles == SignOfTorque::hidden_by_joint)
+    work.draft.columns[torque].add(
+        Certainty::unsure,
+        "relation: it moves together with the joint, which does not show its sign");
 }
 
 std::size_t torque_of_spring(const DraftWork& work) {
@@ -235,11 +262,11 @@ std::size_t torque_of_spring(const DraftWork& work) {
 void guess_gear(DraftWork& work) {
   const Angles angles = angles_by_width(work, angles_by_name(work));
   const std::size_t torque = torque_of_spring(work);
-  compare_with_deflection(work, torque);
-  if (angles.before == kNone || angles.after == kNone || angles.before == angles.after) return;
+  if (angles.before == kNone || angles.after == kNone || angles.before == angles.after)
+    return guess_sign_of_torque(work, nullptr, torque);
   ColumnGuess& before = work.draft.columns[angles.before];
   const auto fit = fit_gear(logs_of(work, angles.before, angles.after, torque));
-  if (!fit || fit->explained < kMovesTogether) {
+  if (!fit || !moves_with_joint(*fit)) {
     before.add(Certainty::unsure, fit ? "relation: it does not move with the joint"
                                       : "relation: one of the angles does not move");
     if (work.readings[angles.before].side == Side::motor) {
@@ -247,7 +274,7 @@ void guess_gear(DraftWork& work) {
       before.needs_ratio = true;
       before.missing = "the gear ratio, which the angles do not show: write it in the place of N";
     }
-    return;
+    return guess_sign_of_torque(work, nullptr, torque);
   }
   if (fit->doubt > kDoubtful)
     leave_ratio_open(work, angles, *fit);
@@ -255,7 +282,7 @@ void guess_gear(DraftWork& work) {
     take_ratio(work, angles, *fit);
   if (torque == kNone && fit->doubt <= kDoubtful && before.gear_ratio != 1.0)
     limit_without_torque(work, angles);
-  guess_sign_of_torque(work, *fit, torque);
+  guess_sign_of_torque(work, &*fit, torque);
 }
 
 }  // namespace torsio

@@ -13,13 +13,11 @@
 namespace torsio {
 namespace {
 
-struct UnitOfStep {
-  double largest;  ///< step of a log, in this unit
-  std::string_view unit;
-};
-// Logs of 20 Hz to 20 kHz have steps of 50 us to 50 ms.
-constexpr auto kUnitsOfSteps =
-    std::to_array<UnitOfStep>({{0.05, "s"}, {50.0, "ms"}, {5e4, "us"}, {5e7, "ns"}});
+constexpr auto kUnitsOfStamps = std::to_array<std::string_view>({"s", "ms", "us", "ns"});
+// Logs have more than 1 Hz and less than 20 kHz.
+constexpr double kShortestStep_s = 1.01 / 20e3;
+constexpr double kLongestStep_s = 0.99;
+constexpr double kUsualRate_Hz = 300.0;
 
 constexpr double kCounterSpan = 4294967296.0;  ///< 2^32
 
@@ -44,12 +42,39 @@ void state_unit_of_clock(ColumnGuess& guess, const NameReading& reading, double 
     guess.add(Certainty::likely, "unit: " + reading.unit + " (word in the name)");
     return;
   }
-  const auto* const fits =
-      std::ranges::find_if(kUnitsOfSteps, [&](const auto& each) { return step <= each.largest; });
-  if (step <= 0.0 || fits == kUnitsOfSteps.end()) return;
-  guess.unit = fits->unit;
-  guess.add(Certainty::likely,
-            fmt::format("values: steps of {:.4g} are those of a log in {}", step, guess.unit));
+  std::vector<std::string_view> possible;  // the nearest to a usual rate first
+  const auto distance = [&](std::string_view unit) {
+    return std::abs(std::log(step * find_unit(unit)->scale * kUsualRate_Hz));
+  };
+  for (const std::string_view unit : kUnitsOfStamps)
+    if (const double step_s = step * find_unit(unit)->scale;
+        step_s > kShortestStep_s && step_s < kLongestStep_s)
+      possible.push_back(unit);
+  if (possible.empty()) return;
+  std::ranges::sort(possible, {}, distance);
+  guess.unit = possible.front();
+  if (possible.size() == 1)
+    guess.add(Certainty::likely,
+              fmt::format("values: steps of {:.4g} are those of a log in {}", step, guess.unit));
+  else
+    guess.add(Certainty::unsure,
+              fmt::format("values: steps of {:.4g} are {:.4g} Hz in {} or {:.4g} Hz in {}", step,
+                          1.0 / (step * find_unit(possible[0])->scale), possible[0],
+                          1.0 / (step * find_unit(possible[1])->scale), possible[1]));
+}
+
+/// Rows in a unit of the stamps, without pauses and where a counter begins again; 0: not known. A
+/// mean, since coarse stamps have steps of several sizes, also 0.
+double usual_rate(const std::vector<double>& stamps, double usual_step) {
+  constexpr double kPause = 3.0;  // in usual steps
+  double span = 0.0;
+  std::size_t steps = 0;
+  for (std::size_t i = 1; i < stamps.size(); ++i)
+    if (const double step = stamps[i] - stamps[i - 1]; step >= 0.0 && step <= kPause * usual_step) {
+      span += step;
+      ++steps;
+    }
+  return span > 0.0 ? static_cast<double>(steps) / span : 0.0;
 }
 
 /// How much speaks for a column as the clock; 0: it is none.
@@ -85,16 +110,13 @@ void take_as_clock(DraftWork& work, std::size_t column, int score) {
   state_unit_of_clock(guess, reading, step);
   const Unit* const unit = find_unit(guess.unit);
   const std::vector<double>& stamps = work.values(column);
-  const double span = stamps.back() - stamps.front();
   const double scale = work.table.columns[column].time != TimeKind::none ? 1.0
                        : unit != nullptr                                 ? unit->scale
                                                                          : 0.0;
-  if (span * scale > 0.0)
-    work.draft.rate_Hz = static_cast<double>(stamps.size() - 1) / (span * scale);
+  if (scale > 0.0) work.draft.rate_Hz = usual_rate(stamps, step) / scale;
   if (wraps(stamps)) {
     guess.unwrap = kCounterSpan;
     guess.add(Certainty::likely, "values: a counter of 32 bits begins again");
-    if (unit != nullptr && step > 0.0) work.draft.rate_Hz = 1.0 / (step * unit->scale);
   }
   if (unit == nullptr) guess.missing = "the unit of the time: set unit: s, ms, us or ns";
 }
@@ -146,11 +168,7 @@ void guess_clock(DraftWork& work) {
     best = i;
     best_score = score;
   }
-  if (best_score == 0 || (best_score == 1 && rising_unknown > 1)) {
-    work.draft.remarks.emplace_back(
-        "no column is a clock: state the sample rate,  rate: 1000Hz  in the mapping or --rate");
-    return;
-  }
+  if (best_score == 0 || (best_score == 1 && rising_unknown > 1)) return;
   take_as_clock(work, best, best_score);
 }
 

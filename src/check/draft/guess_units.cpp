@@ -80,7 +80,7 @@ bool is_counted(const std::vector<double>& values, const ColumnSummary& summary,
 
 /// By the range: a joint does not turn by ten revolutions, nor by less than a degree.
 void guess_angle(ColumnGuess& guess, const NameReading& reading) {
-  guess.is_unit_by_range = true;
+  guess.assumption = guess.reasons.size();
   const double width = guess.summary.highest - guess.summary.lowest;
   const double size = size_of(guess.summary);
   const bool is_motor = reading.side == Side::motor;
@@ -135,6 +135,7 @@ void guess_by_values(ColumnGuess& guess, const NameReading& reading,
     case Quantity::duty: return usual("1", size <= 1.0);
     case Quantity::speed:
     case Quantity::deflection_rate:
+      guess.assumption = guess.reasons.size();
       return take_unit(guess, "rad_s", Certainty::unsure, "values: no angle to compare with");
     case Quantity::force:
     default: return;
@@ -166,12 +167,11 @@ void compare_with_angle(DraftWork& work, std::size_t speed) {
     if (!found) continue;
     const std::string_view unit = unit_of_speed(found->factor);
     if (unit.empty()) continue;
-    guess.reasons.pop_back();  // "no angle to compare with"
-    guess.unit = unit;
     guess.sign = found->factor < 0.0 ? -1.0 : 1.0;
     guess.certainty = of_angle.certainty;
-    guess.add(Certainty::likely, fmt::format("relation: {:.4g} times the derivative of '{}' in {}",
-                                             found->factor, of_angle.summary.name, of_angle.unit));
+    guess.replace_assumption(unit, Certainty::likely,
+                             fmt::format("relation: {:.4g} times the derivative of '{}' in {}",
+                                         found->factor, of_angle.summary.name, of_angle.unit));
     if (guess.sign < 0.0) guess.add(Certainty::unsure, "relation: sign opposite to the angle");
     if (work.readings[speed].side == Side::unknown) {
       work.readings[speed].side = side;
@@ -258,8 +258,7 @@ void guess_units(DraftWork& work) {
                           : "its unit";
   }
   for (const std::size_t speed : work.measured(Quantity::speed))
-    if (work.draft.columns[speed].reasons.back() == "values: no angle to compare with")
-      compare_with_angle(work, speed);
+    if (work.draft.columns[speed].assumption) compare_with_angle(work, speed);
 }
 
 }  // namespace torsio

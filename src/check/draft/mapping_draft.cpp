@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <optional>
 #include <utility>
 
+#include "check/draft/column_relations.hpp"
 #include "check/draft/draft_steps.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
@@ -84,7 +87,8 @@ void include_range(const LogTable& table, std::size_t column, ColumnSummary& sum
   }
 }
 
-/// Columns that cannot be read would be, because of the units in their names: they must be left out by name.
+/// Columns that cannot be read would be, because of the units in their names: they must be left out
+/// by name.
 void drop_unreadable(const LogTable& table, MappingDraft& draft) {
   for (const std::string& left_out : table.not_read) {
     const std::string name = left_out.substr(0, left_out.rfind(" ("));
@@ -111,8 +115,16 @@ bool is_read_with(std::span<const LogTable> tables, MappingDraft& draft) {
   }
 }
 
+constexpr auto kClock = "t_s";
+constexpr auto kGearAngle = "gear_angle_rad";
+constexpr auto kJointAngle = "joint_angle_rad";
+
 /// What `torsio check` needs besides.
-void add_remarks(MappingDraft& draft) {
+void state_remarks(MappingDraft& draft) {
+  draft.remarks.clear();
+  if (std::ranges::find(draft.columns, kClock, &ColumnGuess::channel) == draft.columns.end())
+    draft.remarks.emplace_back(
+        "no column is a clock: state the sample rate,  rate: 1000Hz  in the mapping or --rate");
   if (draft.of("torque_Nm") == nullptr)
     draft.remarks.emplace_back(
         "no column is the torque of the spring (torque_Nm), the target of a model: name it, or "
@@ -138,6 +150,58 @@ void add_remarks(MappingDraft& draft) {
                  : "name other inputs with --inputs"));
 }
 
+double scale_of(const ColumnGuess& guess) {
+  const Unit* const unit = find_unit(guess.unit);
+  return unit != nullptr ? unit->scale : 0.0;
+}
+
+/// Both angles as the ratio was estimated with them.
+struct EstimatedRatio {
+  std::size_t motor = 0;
+  double motor_scale = 0.0;
+  double joint_scale = 0.0;
+};
+
+/// None if the ratio does not follow from the motion of both angles.
+std::optional<EstimatedRatio> estimated_ratio(const MappingDraft& draft) {
+  const ColumnGuess* const motor = draft.of(kGearAngle);
+  const ColumnGuess* const joint = draft.of(kJointAngle);
+  if (motor == nullptr || joint == nullptr || motor->gear_ratio == 1.0) return std::nullopt;
+  return EstimatedRatio{.motor = static_cast<std::size_t>(motor - draft.columns.data()),
+                        .motor_scale = scale_of(*motor),
+                        .joint_scale = scale_of(*joint)};
+}
+
+/// The angles did not change, only their units.
+void keep_relation(MappingDraft& draft, const EstimatedRatio& before) {
+  ColumnGuess& motor = draft.columns[before.motor];
+  if (motor.channel != kGearAngle || motor.gear_ratio == 1.0) return;
+  const ColumnGuess* const joint = draft.of(kJointAngle);
+  if (joint == nullptr) {
+    motor.gear_ratio = 1.0;
+    motor.sign = 1.0;
+    motor.needs_ratio = true;
+    motor.missing =
+        "the gear ratio, which was that to an angle that is not the joint's: write it in the place "
+        "of N";
+    motor.add(Certainty::unsure, "");
+    return;
+  }
+  const double change =
+      scale_of(motor) / before.motor_scale * before.joint_scale / scale_of(*joint);
+  if (change == 1.0) return;
+  const double ratio = plausible_ratio({.factor = change * motor.gear_ratio});
+  motor.add(Certainty::likely,
+            fmt::format("in these units {:.4g} times '{}'", ratio, joint->summary.name));
+  if (ratio >= 1.0 && ratio <= kLargestRatio) {
+    motor.gear_ratio = ratio;
+    return;
+  }
+  motor.gear_ratio = 1.0;
+  motor.needs_ratio = true;
+  motor.missing = "the gear ratio: check the units of both angles, or write it in the place of N";
+}
+
 }  // namespace
 
 std::string_view name(Certainty certainty) noexcept {
@@ -153,6 +217,14 @@ std::string_view name(Certainty certainty) noexcept {
 void ColumnGuess::add(Certainty at_most, std::string reason) {
   certainty = std::min(certainty, at_most);
   if (!reason.empty()) reasons.push_back(std::move(reason));
+}
+
+void ColumnGuess::replace_assumption(std::string_view other_unit, Certainty at_most,
+                                     std::string reason) {
+  unit = other_unit;
+  if (assumption) reasons.erase(reasons.begin() + static_cast<std::ptrdiff_t>(*assumption));
+  assumption.reset();
+  add(at_most, std::move(reason));
 }
 
 std::vector<double> DraftWork::si_values(const LogTable& of, std::size_t column) const {
@@ -217,7 +289,7 @@ MappingDraft draft_mapping(std::span<const LogTable> tables) {
   settle_twins(work);
   guess_held(work);
   drop_unreadable(table, work.draft);
-  add_remarks(work.draft);
+  state_remarks(work.draft);
   return std::move(work.draft);
 }
 
@@ -245,9 +317,14 @@ void try_draft(std::span<const LogTable> tables, MappingDraft& draft) {
 void answer(MappingDraft& draft, std::size_t column, std::string_view text) {
   ColumnGuess& guess = draft.columns[column];
   if (text.empty()) return;
+  const std::optional<EstimatedRatio> ratio = estimated_ratio(draft);
+  const auto settle = [&] {
+    if (ratio) keep_relation(draft, *ratio);
+    state_remarks(draft);
+  };
   if (text == "-") {
     guess = {.summary = guess.summary, .reasons = {"left out by the user"}};
-    return;
+    return settle();
   }
   const auto parts = split_channel_name(text);
   const std::string place = fmt::format("'{}'", printable(guess.summary.name));
@@ -268,6 +345,7 @@ void answer(MappingDraft& draft, std::size_t column, std::string_view text) {
   guess.needs_ratio = false;
   guess.certainty = Certainty::sure;
   guess.reasons.emplace_back("stated by the user");
+  settle();
 }
 
 }  // namespace torsio

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -24,9 +25,11 @@ enum class Certainty : std::uint8_t {
 /// What a column of a log is taken for.
 struct ColumnGuess {
   ColumnSummary summary = {};
-  std::string channel = {};       ///< with its SI unit; empty: none
-  std::string unit = {};          ///< suffix of the unit of the numbers; empty: not known
-  bool is_unit_by_range = false;  ///< its unit is a guess from the range of the numbers
+  std::string channel = {};  ///< with its SI unit; empty: none
+  std::string unit = {};     ///< suffix of the unit of the numbers; empty: not known
+  /// Which of the reasons is that of a unit that is only assumed, by the range of the numbers or
+  /// because it is usual; none: it is shown.
+  std::optional<std::size_t> assumption = {};
   double sign = 1.0;
   double gear_ratio = 1.0;
   bool needs_ratio = false;  ///< the user has to state the gear ratio
@@ -39,6 +42,8 @@ struct ColumnGuess {
 
   [[nodiscard]] bool is_written() const { return !channel.empty() && missing.empty(); }
   void add(Certainty at_most, std::string reason);
+  /// Another unit than the assumed one, whose reason no longer holds.
+  void replace_assumption(std::string_view other_unit, Certainty at_most, std::string reason);
   /// The entry of `channels:`, "joint_angle_rad: {from: pos, unit: deg}".
   [[nodiscard]] std::string rule() const;
 };
@@ -59,22 +64,26 @@ struct MappingDraft {
   [[nodiscard]] std::string yaml() const;
 };
 
-/// Guesses from tables that were read without mapping, with columns of texts left out: logs of one joint. Names and
-/// values are those of the first; the gear ratio and the signs follow from all of them.
+/// Guesses from tables that were read without mapping, with columns of texts left out: logs of one
+/// joint. Names and values are those of the first; the gear ratio and the signs follow from all of
+/// them.
 /// @throws Error if their columns differ
 [[nodiscard]] MappingDraft draft_mapping(std::span<const LogTable> tables);
 [[nodiscard]] inline MappingDraft draft_mapping(const LogTable& table) {
   return draft_mapping(std::span(&table, 1));
 }
 
-/// Reads the tables with the draft, and adds what their clock needs, or why that does not work (`refusal`).
+/// Reads the tables with the draft, and adds what their clock needs, or why that does not work
+/// (`refusal`).
 void try_draft(std::span<const LogTable> tables, MappingDraft& draft);
 inline void try_draft(const LogTable& table, MappingDraft& draft) {
   try_draft(std::span(&table, 1), draft);
 }
 
-/// A user's answer for a column: a channel with the unit of the numbers ("joint_angle_deg"), "-" for none, nothing for
-/// the guess as it is. @throws UsageError if it has no unit or another column is that channel.
+/// A user's answer for a column: a channel with the unit of the numbers ("joint_angle_deg"), "-" for
+/// none, nothing for the guess as it is. The gear ratio is that of the same two angles in the units
+/// stated; without the joint's it is left open. The remarks are those of the new draft.
+/// @throws UsageError if it has no unit or another column is that channel.
 void answer(MappingDraft& draft, std::size_t column, std::string_view text);
 
 }  // namespace torsio

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "check/draft/column_relations.hpp"
 #include "check/draft/logger_styles.hpp"
 #include "data/csv/csv_table.hpp"
 #include "data/mapping/measured_recordings.hpp"
@@ -280,6 +281,186 @@ TEST(MappingDraft, TakesAnswersAndRefusesThoseWithoutUnit) {
   EXPECT_THROW(answer(draft, 2, "torque_Nm"), UsageError);  // taken
   answer(draft, 3, "-");
   EXPECT_EQ(draft.of("torque_Nm"), nullptr);
+}
+
+/// A joint whose columns a function of the row writes.
+template <class CellsOf>
+std::string log_of(const std::string& header, int rows, const CellsOf& cells_of) {
+  std::string text = header + "\n";
+  for (int row = 0; row < rows; ++row) text += cells_of(row) + "\n";
+  return text;
+}
+
+/// Between -1 and 1, without period.
+double noise(int row) {
+  return std::fmod(std::abs(std::sin(12.9898 * row) * 43758.5453), 2.0) - 1.0;
+}
+
+// The encoder of a locked output has noise, whose factor has a sign by chance.
+TEST(MappingDraft, TakesNoSignFromTheNoiseOfALockedOutput) {
+  for (const double sign : {1.0, -1.0}) {
+    const MappingDraft draft = draft_of(log_of(kJointHeader, 2000, [&](int row) {
+      const double torque = 20.0 * std::sin(0.01 * row) + 5.0 * std::sin(0.023 * row);
+      return fmt::format("{:.3f},{:.6f},{:.9f},{:.5f}", 0.004 * row,
+                         100.0 * (torque / 350.0 + 0.0001 * noise(row + 5000)),
+                         sign * 2e-6 * noise(row), torque);
+    }));
+    EXPECT_EQ(draft.of("gear_angle_rad"), nullptr) << draft.yaml();
+    EXPECT_THAT(draft.yaml(), HasSubstr("it does not move with the joint"));
+    const ColumnGuess* const motor = guess_for(draft, "motor_angle_rad");
+    EXPECT_EQ(motor->sign, 1.0) << draft.yaml();
+    ASSERT_NE(draft.of("torque_Nm"), nullptr);
+    EXPECT_EQ(draft.of("torque_Nm")->sign, 1.0) << draft.yaml();
+    EXPECT_THAT(draft.of("torque_Nm")->reasons, testing::Each(Not(HasSubstr("deflection"))));
+  }
+}
+
+TEST(MappingDraft, ComparesWidthsOfAnglesInOneUnit) {
+  // The angle of the motor's side is 20 times the joint's, but in revolutions.
+  const MappingDraft draft = draft_of(log_of("t_s,enc_a_rev,enc_b_deg,torque_Nm", 800, [](int row) {
+    const test::JointState state = test::joint_at(row);
+    return fmt::format("{:.3f},{:.8f},{:.6f},{:.5f}", state.t_s,
+                       20.0 / test::kStyleRatio * state.motor_rad / 6.283185307179586,
+                       57.29577951 * state.joint_rad, state.torque_Nm);
+  }));
+  EXPECT_EQ(guess_for(draft, "enc_a_rev")->rule(),
+            "gear_angle_rad: {from: enc_a_rev, unit: rev, gear_ratio: 20}");
+  EXPECT_EQ(guess_for(draft, "enc_b_deg")->rule(), "joint_angle_rad: {from: enc_b_deg, unit: deg}");
+  EXPECT_EQ(draft.of("torque_Nm")->sign, 1.0) << draft.yaml();
+}
+
+// The error of the ratio is that of the motion that the joint has without the torque.
+TEST(MappingDraft, StatesTheErrorOfARatioThatTheTorqueHides) {
+  JointLog log;
+  for (int row = 0; row < 2000; ++row) {
+    const double torque = std::sin(0.02 * row);
+    log.torque.push_back(torque);
+    log.joint.push_back(torque + 0.01 * noise(row));
+    log.motor.push_back(7.9 * log.joint.back() + 3.0 * torque + 0.02 * noise(row + 7000));
+  }
+  const auto fit = fit_gear({log});
+  ASSERT_TRUE(fit);
+  // 0.02 / sqrt(3) of noise over 0.01 / sqrt(3) sqrt(2000) of motion.
+  EXPECT_NEAR(fit->error, 2.0 / std::sqrt(2000.0), 0.005);
+  EXPECT_NEAR(fit->factor, 7.9, 4.0 * fit->error);
+  EXPECT_TRUE(moves_with_joint(*fit));
+}
+
+TEST(MappingDraft, HasNoRatioForAFactorOfZero) {
+  EXPECT_EQ(plausible_ratio({.factor = 0.0}), 0.0);
+  EXPECT_EQ(plausible_ratio({.factor = HUGE_VAL}), 0.0);
+  EXPECT_EQ(plausible_ratio({.factor = -100.02}), 100.0);
+}
+
+std::string log_with_step(double step) {
+  return log_of("t,joint_rad,torque_Nm", 400, [&](int row) {
+    return fmt::format("{:.6g},{:.5f},{:.5f}", step * row, std::sin(0.05 * row),
+                       5.0 * std::cos(0.05 * row));
+  });
+}
+
+TEST(MappingDraft, IsUnsureOfAUnitOfTimeWhereTwoFit) {
+  const auto clock_for = [](double step) { return *guess_for(draft_of(log_with_step(step)), "t"); };
+  struct Step {
+    double step;
+    const char* unit;
+    Certainty certainty;
+  };
+  for (const Step& each :
+       {Step{0.004, "s", Certainty::likely}, Step{0.1, "s", Certainty::unsure},
+        Step{0.5, "ms", Certainty::unsure}, Step{1.0, "ms", Certainty::likely},
+        Step{20.0, "ms", Certainty::likely}, Step{250.0, "us", Certainty::unsure},
+        Step{4000.0, "us", Certainty::likely}}) {
+    const ColumnGuess clock = clock_for(each.step);
+    EXPECT_EQ(clock.unit, each.unit) << each.step;
+    EXPECT_EQ(clock.certainty, each.certainty) << each.step;
+  }
+  EXPECT_THAT(clock_for(0.1).reasons, testing::Contains(HasSubstr("10 Hz in s or 1e+04 Hz in ms")));
+}
+
+TEST(MappingDraft, HasTheUsualRateOfALogWithAPause) {
+  const MappingDraft draft = draft_of(log_of("t_s,joint_rad,torque_Nm", 800, [](int row) {
+    const double t = 0.004 * row + (row >= 500 ? 7.0 : 0.0);
+    return fmt::format("{:.3f},{:.5f},{:.5f}", t, std::sin(0.05 * row), 5.0 * std::cos(0.05 * row));
+  }));
+  EXPECT_NEAR(draft.rate_Hz, 250.0, 0.1);
+  // Stamps of 10 ms for rows of 4 ms: their mean.
+  const MappingDraft coarse = draft_of(log_of("time_ms,joint_rad,torque_Nm", 400, [](int row) {
+    return fmt::format("{},{:.5f},{:.5f}", 10 * (row * 4 / 10), std::sin(0.05 * row),
+                       5.0 * std::cos(0.05 * row));
+  }));
+  EXPECT_NEAR(coarse.rate_Hz, 250.0, 1.0);
+}
+
+// The angles show that the torque is right, and that the deflection has the wrong sign.
+TEST(MappingDraft, PrefersTheAnglesToADeflectionOfTheWrongSign) {
+  const MappingDraft draft =
+      draft_of(log_of("t_s,motor_rad,joint_rad,torque_Nm,deflection_rad", 800, [](int row) {
+        const test::JointState state = test::joint_at(row);
+        const double twist = state.motor_rad / test::kStyleRatio - state.joint_rad;
+        return fmt::format("{:.3f},{:.6f},{:.6f},{:.5f},{:.7f}", state.t_s, state.motor_rad,
+                           state.joint_rad, state.torque_Nm, -twist);
+      }));
+  ASSERT_NE(draft.of("torque_Nm"), nullptr) << draft.yaml();
+  EXPECT_EQ(draft.of("torque_Nm")->sign, 1.0) << draft.yaml();
+  EXPECT_THAT(draft.of("torque_Nm")->reasons, Not(testing::Contains(HasSubstr("falls with"))));
+  ASSERT_NE(draft.of("spring_deflection_rad"), nullptr) << draft.yaml();
+  EXPECT_EQ(draft.of("spring_deflection_rad")->sign, -1.0) << draft.yaml();
+}
+
+TEST(MappingDraft, ReplacesTheReasonOfAUnitThatTheRatioChanges) {
+  // In degrees, of which the range fits radians as well.
+  const MappingDraft draft =
+      draft_of(log_of("t_s,motor_position,joint_rad,torque_Nm", 800, [](int row) {
+        const test::JointState state = test::joint_at(row);
+        return fmt::format("{:.3f},{:.6f},{:.6f},{:.5f}", state.t_s,
+                           57.29577951 * 50.0 / test::kStyleRatio * state.motor_rad,
+                           state.joint_rad, state.torque_Nm);
+      }));
+  const ColumnGuess* const motor = guess_for(draft, "motor_position");
+  EXPECT_EQ(motor->rule(), "gear_angle_rad: {from: motor_position, unit: deg, gear_ratio: 50}");
+  EXPECT_EQ(motor->certainty, Certainty::unsure);
+  EXPECT_THAT(motor->reasons, AllOf(testing::Contains(HasSubstr("only in deg is the ratio one")),
+                                    Not(testing::Contains(HasSubstr("fits radians")))));
+}
+
+TEST(MappingDraft, KeepsTheRelationOfTheAnglesForAnAnswerInAnotherUnit) {
+  const std::string text = log_of("t_s,motor_rad,joint_rad,torque_Nm", 800, [](int row) {
+    const test::JointState state = test::joint_at(row);
+    return fmt::format("{:.3f},{:.6f},{:.6f},{:.5f}", state.t_s,
+                       300.0 / test::kStyleRatio * state.motor_rad, state.joint_rad,
+                       state.torque_Nm);
+  });
+  const MappingDraft guessed = draft_of(text);
+  ASSERT_EQ(guessed.of("gear_angle_rad")->gear_ratio, 300.0) << guessed.yaml();
+  MappingDraft motor = guessed;
+  answer(motor, 1, "gear_angle_deg");
+  ASSERT_NE(motor.of("gear_angle_rad"), nullptr) << motor.yaml();
+  EXPECT_NEAR(motor.of("gear_angle_rad")->gear_ratio, 300.0 * M_PI / 180.0, 1e-3);
+  MappingDraft both = motor;
+  answer(both, 2, "joint_angle_deg");
+  EXPECT_NEAR(both.of("gear_angle_rad")->gear_ratio, 300.0, 1e-9) << both.yaml();
+  // 300 * 57 is the ratio of no gear.
+  MappingDraft joint = guessed;
+  answer(joint, 2, "joint_angle_deg");
+  EXPECT_EQ(joint.of("gear_angle_rad"), nullptr);
+  EXPECT_THAT(joint.yaml(), HasSubstr("check the units of both angles"));
+  EXPECT_THAT(joint.yaml(), HasSubstr("gear_ratio: N"));
+}
+
+TEST(MappingDraft, HasTheRemarksAndTheRatioOfTheAnswers) {
+  MappingDraft draft = draft_of(log_of("t_s,motor_rad,joint_rad,c", 800, [](int row) {
+    const test::JointState state = test::joint_at(row);
+    return fmt::format("{:.3f},{:.6f},{:.6f},{:.5f}", state.t_s, 80.0 * state.joint_rad,
+                       state.joint_rad, state.torque_Nm);
+  }));
+  EXPECT_THAT(draft.remarks, testing::Contains(HasSubstr("no column is the torque")));
+  answer(draft, 3, "torque_Nm");
+  EXPECT_THAT(draft.remarks, testing::IsEmpty());
+  answer(draft, 2, "-");
+  EXPECT_THAT(draft.remarks, testing::ElementsAre(HasSubstr("no deflection")));
+  EXPECT_EQ(draft.of("gear_angle_rad"), nullptr) << draft.yaml();
+  EXPECT_THAT(draft.yaml(), HasSubstr("that to an angle that is not the joint's"));
 }
 
 TEST(MappingDraft, RefusesLogsWithoutMotion) {
