@@ -164,6 +164,7 @@ std::string warning_of(const Estimator& estimator, const Dataset& dataset,
                     fmt::join(zeroed, ", "));
   } else if (!angles.empty()) {
     std::vector<std::string> rules;
+    rules.reserve(angles.size());
     for (const std::string& angle : angles)
       rules.push_back(fmt::format("{{channel: {}, first: 0.5s}}", angle));
     text += fmt::format(

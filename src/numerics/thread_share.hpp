@@ -12,17 +12,22 @@ namespace torsio {
 class ThreadShare {
  public:
   /// @param threads must outlive this; null: as many as the machine has.
-  explicit ThreadShare(const std::atomic<std::size_t>* threads) noexcept : before_(threads_) {
-    threads_ = threads;
+  explicit ThreadShare(const std::atomic<std::size_t>* threads) noexcept : before_(own()) {
+    own() = threads;
   }
-  ~ThreadShare() { threads_ = before_; }
+  ~ThreadShare() { own() = before_; }
   ThreadShare(const ThreadShare&) = delete;
   ThreadShare& operator=(const ThreadShare&) = delete;
 
-  [[nodiscard]] static const std::atomic<std::size_t>* current() noexcept { return threads_; }
+  [[nodiscard]] static const std::atomic<std::size_t>* current() noexcept { return own(); }
 
  private:
-  static inline thread_local const std::atomic<std::size_t>* threads_ = nullptr;
+  /// The share of this thread.
+  static const std::atomic<std::size_t>*& own() noexcept {
+    thread_local const std::atomic<std::size_t>* threads = nullptr;
+    return threads;
+  }
+
   const std::atomic<std::size_t>* before_;
 };
 

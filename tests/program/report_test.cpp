@@ -182,7 +182,7 @@ TEST_F(FirstMinute, CompletionKnowsTheVerbsAndTheirOptions) {
   EXPECT_EQ(complete("simulate dfki-28 : lu", 4), "lugre\n");
   EXPECT_EQ(complete("simulate dfki-28 : lugre static", 5), "static-cycle\n");
   EXPECT_EQ(complete("fit a.csv --model = grey", 5), "grey_box\n");
-  EXPECT_EQ(complete("fit a.csv --model =", 4), complete("fit a.csv --model ''", 4));
+  EXPECT_EQ(complete("fit a.csv --model =", 4), complete("fit a.csv --model \"\"", 4));
   EXPECT_EQ(complete("simulate --describe dfki-28:lu", 3), "dfki-28:lugre\n");
   EXPECT_EQ(complete("simulate -o static", 3), "\n") << "a file, not an experiment";
   for (const char* shell_name : {"bash", "zsh", "fish"}) {

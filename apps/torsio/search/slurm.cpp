@@ -18,8 +18,6 @@
 #include "common/output.hpp"
 #include "torsio/core/error.hpp"
 
-extern char** environ;
-
 namespace {
 
 /// What a program wrote to standard output and error, and its exit code; none if it is not installed.
@@ -38,6 +36,7 @@ std::optional<CommandOutput> output_of(const std::vector<std::string>& command) 
   posix_spawn_file_actions_adddup2(&actions, pipe_ends[1], STDERR_FILENO);
   std::vector<char*> arguments;
   std::vector<std::string> own = command;
+  arguments.reserve(own.size() + 1);
   for (std::string& argument : own) arguments.push_back(argument.data());
   arguments.push_back(nullptr);
   pid_t process = 0;

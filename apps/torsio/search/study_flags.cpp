@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <signal.h>
 
 #include <cerrno>
 #include <charconv>
+#include <csignal>
 #include <mutex>
 #include <string_view>
 
