@@ -40,7 +40,7 @@ endmacro()
 
 if(TORSIO_BUILD_LAB)
   torsio_debian_package(program torsio science "The program torsio, its manual pages and documents.")
-  set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libmatio11")  # loaded when a MATLAB file is read
+  set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libmatio11, libpq5")  # loaded for MATLAB files, and for stores on a server
   set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "calculix-ccx")  # run by design coupling
 endif()
 if(TORSIO_BUILD_C)

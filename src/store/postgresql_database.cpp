@@ -3,6 +3,7 @@
 #include "store/database.hpp"
 
 #if TORSIO_HAS_POSTGRESQL
+#include <dlfcn.h>
 #include <libpq-fe.h>
 
 #include <array>
@@ -22,11 +23,78 @@ constexpr Oid kText = 25;
 constexpr Oid kFloat4 = 700;
 constexpr Oid kFloat8 = 701;
 
+/// The functions of libpq that are used here.
+struct Libpq {
+  decltype(&::PQclear) clear = nullptr;
+  decltype(&::PQconnectdbParams) connect = nullptr;
+  decltype(&::PQconnectionNeedsPassword) needs_password = nullptr;
+  decltype(&::PQerrorMessage) error_message = nullptr;
+  decltype(&::PQexec) exec = nullptr;
+  decltype(&::PQexecParams) exec_params = nullptr;
+  decltype(&::PQfinish) finish = nullptr;
+  decltype(&::PQfreemem) free_memory = nullptr;
+  decltype(&::PQftype) field_type = nullptr;
+  decltype(&::PQgetisnull) is_null = nullptr;
+  decltype(&::PQgetlength) length = nullptr;
+  decltype(&::PQgetvalue) value = nullptr;
+  decltype(&::PQnfields) fields = nullptr;
+  decltype(&::PQntuples) rows = nullptr;
+  decltype(&::PQresultErrorField) result_error_field = nullptr;
+  decltype(&::PQresultErrorMessage) result_error_message = nullptr;
+  decltype(&::PQresultStatus) result_status = nullptr;
+  decltype(&::PQsetNoticeProcessor) set_notice_processor = nullptr;
+  decltype(&::PQstatus) status = nullptr;
+  decltype(&::PQunescapeBytea) unescape_bytea = nullptr;
+};
+
+/// libpq is loaded when the first server is opened: it needs Kerberos, LDAP and TLS, which no other
+/// part of torsio does. @throws Error if it is not installed.
+const Libpq& libpq() {
+  static const Libpq loaded = [] {
+    void* const library = dlopen(TORSIO_LIBPQ_SONAME, RTLD_NOW | RTLD_LOCAL);
+    Libpq functions;
+    bool is_complete = library != nullptr;
+    const auto load = [&](const char* name, auto& function) {
+      if (!is_complete) return;
+      function = reinterpret_cast<std::decay_t<decltype(function)>>(dlsym(library, name));
+      is_complete = function != nullptr;
+    };
+    load("PQclear", functions.clear);
+    load("PQconnectdbParams", functions.connect);
+    load("PQconnectionNeedsPassword", functions.needs_password);
+    load("PQerrorMessage", functions.error_message);
+    load("PQexec", functions.exec);
+    load("PQexecParams", functions.exec_params);
+    load("PQfinish", functions.finish);
+    load("PQfreemem", functions.free_memory);
+    load("PQftype", functions.field_type);
+    load("PQgetisnull", functions.is_null);
+    load("PQgetlength", functions.length);
+    load("PQgetvalue", functions.value);
+    load("PQnfields", functions.fields);
+    load("PQntuples", functions.rows);
+    load("PQresultErrorField", functions.result_error_field);
+    load("PQresultErrorMessage", functions.result_error_message);
+    load("PQresultStatus", functions.result_status);
+    load("PQsetNoticeProcessor", functions.set_notice_processor);
+    load("PQstatus", functions.status);
+    load("PQunescapeBytea", functions.unescape_bytea);
+    if (!is_complete)
+      throw Error(
+          {.place = "--store",
+           .problem = "the client library of PostgreSQL cannot be loaded (" TORSIO_LIBPQ_SONAME ")",
+           .advice = "Install it (Debian: libpq5), or use --store with the path of a SQLite "
+                     "file."});
+    return functions;
+  }();
+  return loaded;
+}
+
 struct FinishConnection {
-  void operator()(PGconn* connection) const noexcept { PQfinish(connection); }
+  void operator()(PGconn* connection) const noexcept { libpq().finish(connection); }
 };
 struct ClearResult {
-  void operator()(PGresult* result) const noexcept { PQclear(result); }
+  void operator()(PGresult* result) const noexcept { libpq().clear(result); }
 };
 using PostgresqlResult = std::unique_ptr<PGresult, ClearResult>;
 
@@ -76,19 +144,19 @@ class PostgresqlDatabase final : public Database {
           },
           values[i]);
     }
-    const PostgresqlResult result(PQexecParams(connection_.get(), std::string(sql).c_str(),
-                                               static_cast<int>(values.size()), types.data(),
-                                               pointers.data(), lengths.data(), formats.data(), 0));
+    const PostgresqlResult result(libpq().exec_params(
+        connection_.get(), std::string(sql).c_str(), static_cast<int>(values.size()), types.data(),
+        pointers.data(), lengths.data(), formats.data(), 0));
     check(result.get());
-    std::vector<DatabaseRow> rows(static_cast<std::size_t>(PQntuples(result.get())));
+    std::vector<DatabaseRow> rows(static_cast<std::size_t>(libpq().rows(result.get())));
     for (std::size_t r = 0; r < rows.size(); ++r)
-      for (int c = 0; c < PQnfields(result.get()); ++c)
+      for (int c = 0; c < libpq().fields(result.get()); ++c)
         rows[r].push_back(value_at(result.get(), static_cast<int>(r), c));
     return rows;
   }
 
   void run_script(const std::string& sql) override {
-    const PostgresqlResult result(PQexec(connection_.get(), sql.c_str()));
+    const PostgresqlResult result(libpq().exec(connection_.get(), sql.c_str()));
     check(result.get());
   }
 
@@ -98,7 +166,7 @@ class PostgresqlDatabase final : public Database {
   }
 
   void roll_back() noexcept override {
-    if (connection_) PQclear(PQexec(connection_.get(), "ROLLBACK"));
+    if (connection_) libpq().clear(libpq().exec(connection_.get(), "ROLLBACK"));
   }
 
   void reconnect() override {
@@ -125,9 +193,9 @@ class PostgresqlDatabase final : public Database {
          "keepalives_interval", "keepalives_count", "client_encoding", nullptr});
     const auto values = std::to_array<const char*>(
         {url_.c_str(), "torsio", "10", "1", "20", "5", "3", "UTF8", nullptr});
-    connection_.reset(PQconnectdbParams(kKeywords.data(), values.data(), 1));
-    if (PQstatus(connection_.get()) != CONNECTION_OK) refuse_connection();
-    PQsetNoticeProcessor(
+    connection_.reset(libpq().connect(kKeywords.data(), values.data(), 1));
+    if (libpq().status(connection_.get()) != CONNECTION_OK) refuse_connection();
+    libpq().set_notice_processor(
         connection_.get(), [](void*, const char*) {}, nullptr);
     // A transaction that lasts pins old rows for all other workers: none of torsio's takes seconds.
     run_script(
@@ -136,8 +204,8 @@ class PostgresqlDatabase final : public Database {
   }
 
   [[noreturn]] void refuse_connection() const {
-    const std::string reason = one_line(PQerrorMessage(connection_.get()));
-    const bool wrong_login = PQconnectionNeedsPassword(connection_.get()) != 0 ||
+    const std::string reason = one_line(libpq().error_message(connection_.get()));
+    const bool wrong_login = libpq().needs_password(connection_.get()) != 0 ||
                              reason.find("authentication failed") != std::string::npos ||
                              (reason.find("role") != std::string::npos &&
                               reason.find("does not exist") != std::string::npos);
@@ -158,15 +226,15 @@ class PostgresqlDatabase final : public Database {
   }
 
   void check(const PGresult* result) const {
-    const ExecStatusType status = PQresultStatus(result);
+    const ExecStatusType status = libpq().result_status(result);
     if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK) return;
-    const char* const code = PQresultErrorField(result, PG_DIAG_SQLSTATE);
+    const char* const code = libpq().result_error_field(result, PG_DIAG_SQLSTATE);
     const std::string_view state = code == nullptr ? "" : code;
-    const std::string reason = one_line(result == nullptr ? PQerrorMessage(connection_.get())
-                                                          : PQresultErrorMessage(result));
+    const std::string reason = one_line(result == nullptr ? libpq().error_message(connection_.get())
+                                                          : libpq().result_error_message(result));
     // 08: connection, 57P: the server ends or starts, 40: the transaction is to be repeated.
     if (state.empty() || state.starts_with("08") || state.starts_with("57P") ||
-        state.starts_with("40") || PQstatus(connection_.get()) != CONNECTION_OK)
+        state.starts_with("40") || libpq().status(connection_.get()) != CONNECTION_OK)
       throw ConnectionLost({.place = name_, .problem = "the connection was lost (" + reason + ")"});
     ErrorReport report{.place = name_, .problem = reason};
     if (state.starts_with("53")) {
@@ -183,10 +251,10 @@ class PostgresqlDatabase final : public Database {
   }
 
   static DatabaseValue value_at(const PGresult* result, int row, int column) {
-    if (PQgetisnull(result, row, column) != 0) return std::monostate{};
-    const char* const text = PQgetvalue(result, row, column);
-    const auto length = static_cast<std::size_t>(PQgetlength(result, row, column));
-    switch (PQftype(result, column)) {
+    if (libpq().is_null(result, row, column) != 0) return std::monostate{};
+    const char* const text = libpq().value(result, row, column);
+    const auto length = static_cast<std::size_t>(libpq().length(result, row, column));
+    switch (libpq().field_type(result, column)) {
       case kBool: return std::int64_t{*text == 't' ? 1 : 0};
       case kInt2:
       case kInt4:
@@ -204,9 +272,9 @@ class PostgresqlDatabase final : public Database {
       case kBytea: {
         std::size_t size = 0;
         unsigned char* const bytes =
-            PQunescapeBytea(reinterpret_cast<const unsigned char*>(text), &size);
+            libpq().unescape_bytea(reinterpret_cast<const unsigned char*>(text), &size);
         Blob blob{std::string(reinterpret_cast<const char*>(bytes), size)};
-        PQfreemem(bytes);
+        libpq().free_memory(bytes);
         return blob;
       }
       default: return std::string(text, length);
