@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <system_error>
+#include <thread>
 
 #include "store/database.hpp"
 
@@ -56,7 +58,7 @@ class SqliteDatabase final : public Database {
     }
     refuse_network(address.target);
     open(address.target.c_str());
-    run("PRAGMA journal_mode=WAL");
+    keep_log();
     // A crash of the program loses nothing; after a power cut the last trials may be done again.
     run("PRAGMA synchronous=NORMAL");
   }
@@ -128,6 +130,21 @@ class SqliteDatabase final : public Database {
                                         network),
                  .advice = "Use --store with a file on a local disk, or a PostgreSQL server: "
                            "--store postgresql://user@host/torsio."});
+  }
+
+  /// Changes to the journal of a log. While another program does so too, SQLite fails at once
+  /// instead of waiting.
+  void keep_log() {
+    constexpr auto kPause = std::chrono::milliseconds(20);
+    for (auto waited = std::chrono::milliseconds(0); waited < std::chrono::seconds(kBusyTimeout_s);
+         waited += kPause) {
+      if (sqlite3_exec(database_.get(), "PRAGMA journal_mode=WAL", nullptr, nullptr, nullptr) ==
+          SQLITE_OK)
+        return;
+      if ((sqlite3_errcode(database_.get()) & 0xff) != SQLITE_BUSY) fail();
+      std::this_thread::sleep_for(kPause);
+    }
+    fail();
   }
 
   void open(const char* path) {
