@@ -2,6 +2,7 @@
 
 #include <zstd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -121,6 +122,18 @@ std::vector<ResultRow> rows_from_text(std::string_view text) {
     refuse_stored();
   }
   return rows;
+}
+
+TrialResult trial_result(const std::vector<ResultRow>& rows) {
+  TrialResult result{.result = rows_text(rows)};
+  const auto total = std::ranges::find_if(
+      rows, [](const ResultRow& row) { return row.split == Role::test && !row.recording; });
+  result.is_failed = total == rows.end() || total->status != "ok";
+  if (result.is_failed)
+    result.reason = (total == rows.end() ? rows.back() : *total).reason;
+  else
+    result.value = total->score.metrics.rmse;
+  return result;
 }
 
 std::string pack_estimates(const std::vector<MeasuredEstimates>& recordings) {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <nlohmann/json.hpp>
@@ -76,15 +75,7 @@ TrialResult SpecimenStudy::run(const Claim& claim, const Progress& progress) {
   InputSets inputs(dataset, false);
   const ScoredModel scored =
       fit_and_score(dataset, inputs, choices.front(), request_.seed, kRoles, progress);
-  TrialResult result{.result = rows_text(scored.rows)};
-  const auto total = std::ranges::find_if(
-      scored.rows, [](const ResultRow& row) { return row.split == Role::test && !row.recording; });
-  result.is_failed = total == scored.rows.end() || total->status != "ok";
-  if (result.is_failed)
-    result.reason = scored.rows.back().reason;
-  else
-    result.value = total->score.metrics.rmse;
-  return result;
+  return trial_result(scored.rows);
 }
 
 std::string request_text(const SpecimenRequest& request) {

@@ -9,7 +9,6 @@
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -130,8 +129,8 @@ class StructureStudy::Plan {
         settings_(settings),
         folds_(dataset_, {.folds = settings.folds}, candidates_, settings.seed) {
     // A wrong setting or a leak is found before any fit.
-    FoldData first(dataset_, settings_.allow_leak);
-    for (const ModelChoice& choice : candidates_) (void)first.inputs.leak_of(choice.features);
+    InputSets inputs(dataset_, settings_.allow_leak);
+    for (const ModelChoice& choice : candidates_) (void)inputs.leak_of(choice.features);
     samples_ = samples_to_train_on(dataset_);
   }
 
@@ -154,16 +153,7 @@ class StructureStudy::Plan {
     ScoredModel scored =
         fit_and_score(data->dataset, data->inputs, choice, settings_.seed, kFoldRoles, progress);
     std::erase_if(scored.rows, [](const ResultRow& row) { return row.split == Role::train; });
-    TrialResult result{.result = rows_text(scored.rows)};
-    const auto total = std::ranges::find_if(scored.rows, [](const ResultRow& row) {
-      return row.split == Role::test && !row.recording;
-    });
-    if (total == scored.rows.end() || total->status != "ok") {
-      result.is_failed = true;
-      result.reason = (total == scored.rows.end() ? scored.rows.back() : *total).reason;
-    } else {
-      result.value = total->score.metrics.rmse;
-    }
+    TrialResult result = trial_result(scored.rows);
     if (claim.step == kLastStep && !scored.estimates.empty())
       result.samples = pack_estimates(scored.estimates.front().recordings);
     return result;
