@@ -13,6 +13,7 @@
 
 #include "data/channel_names.hpp"
 #include "data/facts_of_run.hpp"
+#include "data/load_roles.hpp"
 #include "data/mapping/canonical_channels.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
@@ -383,6 +384,22 @@ Dataset load_dataset(const std::vector<std::string>& train_files,
   for (const std::string& path : train_files) collector.add(path);
   for (const std::string& path : test_files) collector.add(path, Role::test);
   Dataset dataset = collector.finish();
+  if (!options.computes_target) dataset.check();
+  return dataset;
+}
+
+Dataset load_with_validation(const std::vector<std::string>& train_files,
+                             const std::vector<std::string>& validation_files,
+                             const std::vector<std::string>& test_files,
+                             const LoadOptions& options) {
+  Dataset dataset = load_dataset(train_files, test_files, options);
+  if (validation_files.empty()) return dataset;
+  Dataset held_out = load_dataset({}, validation_files, options);
+  for (DatasetRecord& record : held_out.records) {
+    for (Segment& segment : record.segments) segment.role = Role::validation;
+    dataset.records.push_back(std::move(record));
+  }
+  std::ranges::move(held_out.files, std::back_inserter(dataset.files));
   if (!options.computes_target) dataset.check();
   return dataset;
 }

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/did_you_mean.hpp"
+#include "evaluate/role_samples.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/evaluate/cross_validation.hpp"
@@ -20,13 +21,6 @@ struct HeldOut {
   std::size_t begin = 0;
   std::size_t end = 0;
 };
-
-std::size_t train_samples(const DatasetRecord& record) {
-  std::size_t count = 0;
-  for (const Segment& segment : record.segments)
-    if (segment.role == Role::train) count += segment.end - segment.begin;
-  return count;
-}
 
 std::vector<std::size_t> train_records(const Dataset& dataset) {
   std::vector<std::size_t> records;
@@ -63,9 +57,7 @@ Fold make_fold(const Dataset& dataset, std::string name, const std::vector<HeldO
   for (std::size_t i = 0; i < dataset.records.size(); ++i) {
     const DatasetRecord& record = dataset.records[i];
     fold.segments.push_back(cut(record, holes[i], embargo));
-    std::size_t held_out = 0;
-    for (const Segment& segment : fold.segments.back())
-      if (segment.role == Role::test) held_out += segment.end - segment.begin;
+    const std::size_t held_out = samples_with_role(fold.segments.back(), Role::test);
     if (held_out > 0) fold.recordings.push_back(record.recording.name());
     fold.held_out_samples += held_out;
   }
@@ -84,7 +76,7 @@ FoldPlan record_folds(const Dataset& dataset, const std::vector<std::size_t>& re
   std::vector<std::vector<HeldOut>> holes(folds, std::vector<HeldOut>(dataset.records.size()));
   for (const std::size_t i : order) {
     const auto fold = static_cast<std::size_t>(std::ranges::min_element(samples) - samples.begin());
-    samples[fold] += train_samples(dataset.records[i]);
+    samples[fold] += samples_with_role(dataset.records[i].segments, Role::train);
     holes[fold][i] = whole(dataset.records[i]);
   }
   FoldPlan plan{.label = fmt::format("{}-fold cross-validation over {} recordings, seed {}", folds,
@@ -120,7 +112,7 @@ FoldPlan block_folds(const Dataset& dataset, const std::vector<std::size_t>& rec
     std::vector<HeldOut> holes(dataset.records.size());
     for (const std::size_t i : records) {
       const DatasetRecord& record = dataset.records[i];
-      const std::size_t samples = train_samples(record);
+      const std::size_t samples = samples_with_role(record.segments, Role::train);
       if (samples < folds)
         throw UsageError({.place = "--folds",
                           .expected = fmt::format("at most {}, the samples of {}", samples,

@@ -10,6 +10,7 @@
 #include "core/checks.hpp"
 #include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
+#include "evaluate/role_samples.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/train_model.hpp"
 
@@ -17,11 +18,7 @@ namespace torsio {
 namespace {
 
 double training_seconds(const Dataset& dataset) {
-  std::size_t samples = 0;
-  for (const DatasetRecord& record : dataset.records)
-    for (const Segment& segment : record.segments)
-      if (segment.role == Role::train) samples += segment.end - segment.begin;
-  return static_cast<double>(samples) / dataset.sample_rate_Hz();
+  return static_cast<double>(samples_with_role(dataset, Role::train)) / dataset.sample_rate_Hz();
 }
 
 double rmse_of(const TransferEvaluation& evaluation, std::string_view method) {

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "data/load_roles.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/load.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/common/load_target.hpp"
 #include "torsio/joint_load/known_load.hpp"
@@ -116,14 +116,7 @@ Dataset load_search_data(const SearchRequest& request, const Progress& progress)
   if (request.rate_Hz > 0.0) options.rate_Hz = request.rate_Hz;
   options.target = request.target;
   options.computes_target = !request.load_file.empty();
-  Dataset dataset = load_dataset(request.recordings, {}, options);
-  if (!request.validation.empty()) {
-    Dataset held_out = load_dataset({}, request.validation, options);
-    for (DatasetRecord& record : held_out.records) {
-      for (Segment& segment : record.segments) segment.role = Role::validation;
-      dataset.records.push_back(std::move(record));
-    }
-  }
+  Dataset dataset = load_with_validation(request.recordings, request.validation, {}, options);
   dataset.initialise_samples = request.initialise;
   if (!request.load_file.empty()) {
     const std::vector<std::string> first =

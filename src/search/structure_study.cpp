@@ -14,6 +14,7 @@
 
 #include "evaluate/fold_scores.hpp"
 #include "evaluate/model_label.hpp"
+#include "evaluate/role_samples.hpp"
 #include "search/scored_model_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/families.hpp"
@@ -104,14 +105,6 @@ void add_share_of(const DatasetRecord& record, double share, std::vector<Dataset
   if (!others.segments.empty()) records.push_back(std::move(others));
 }
 
-std::size_t samples_to_train_on(const Dataset& dataset) {
-  std::size_t count = 0;
-  for (const DatasetRecord& record : dataset.records)
-    for (const Segment& segment : record.segments)
-      if (segment.role == Role::train) count += segment.end - segment.begin;
-  return count;
-}
-
 /// The recordings with the roles of a fold, for all threads.
 struct FoldData {
   FoldData(Dataset own, bool allow_leak) : dataset(std::move(own)), inputs(dataset, allow_leak) {}
@@ -131,7 +124,7 @@ class StructureStudy::Plan {
     // A wrong setting or a leak is found before any fit.
     InputSets inputs(dataset_, settings_.allow_leak);
     for (const ModelChoice& choice : candidates_) (void)inputs.leak_of(choice.features);
-    samples_ = samples_to_train_on(dataset_);
+    samples_ = samples_with_role(dataset_, Role::train);
   }
 
   [[nodiscard]] std::vector<Trial> first_trials() const {

@@ -14,6 +14,7 @@
 
 #include "common/output.hpp"
 #include "core/quantity.hpp"
+#include "data/load_roles.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
@@ -238,12 +239,6 @@ void DataFlags::remark_on_reading(std::span<const torsio::Recording* const> reco
   }
 }
 
-torsio::Dataset DataFlags::read(const std::vector<std::string>& files,
-                                const std::vector<std::string>& test,
-                                const torsio::LoadOptions& options) const {
-  return checked([&] { return torsio::load_dataset(files, test, options); });
-}
-
 torsio::Dataset DataFlags::load_inputs(const std::vector<std::string>& channels,
                                        const torsio::Progress& progress) const {
   require_recordings();
@@ -254,23 +249,16 @@ torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
                                 const std::vector<std::string>& test,
                                 const torsio::Progress& progress) const {
   require_recordings();
-  const torsio::LoadOptions options = load_options(progress);
-  torsio::Dataset dataset = read(recordings, test, options);
-  if (validation.empty()) return dataset;
-  torsio::Dataset held_out = read({}, validation, options);
-  for (torsio::DatasetRecord& record : held_out.records) {
-    for (torsio::Segment& segment : record.segments) segment.role = torsio::Role::validation;
-    dataset.records.push_back(std::move(record));
-  }
-  if (load_file.empty()) dataset.check();
-  return dataset;
+  return checked([&] {
+    return torsio::load_with_validation(recordings, validation, test, load_options(progress));
+  });
 }
 
 torsio::Dataset DataFlags::load_as_test(const torsio::Progress& progress) const {
   require_recordings();
   torsio::LoadOptions options = load_options(progress);
   options.role = torsio::Role::test;
-  return read(recordings, {}, options);
+  return checked([&] { return torsio::load_dataset(recordings, {}, options); });
 }
 
 std::vector<std::string> DataFlags::wanted_inputs() const {

@@ -71,9 +71,6 @@ struct DataFlags {
  private:
   void add_rate_and_joint(CLI::App& verb);
   void require_recordings() const;
-  [[nodiscard]] torsio::Dataset read(const std::vector<std::string>& files,
-                                     const std::vector<std::string>& test,
-                                     const torsio::LoadOptions& options) const;
   void check_not_read(const std::vector<std::string>& files_read) const;
 
   void remark_on_mapping(const torsio::Dataset& dataset) const;
