@@ -90,6 +90,8 @@ std::vector<NamedValues> named_values(const CLI::App& app) {
                                   {"drift", "--model", family_words()},
                                   {"reproduce", "1", study_words()},
                                   {"completion", "1", "bash zsh fish"},
+                                  {"search", "--halving", "family all off"},
+                                  {"search", "--engine", "local slurm"},
                                   {"track", "--joint-output", "locked free"},
                                   {"track", "--acts-on", "current velocity"}};
   std::vector<std::string_view> references(torsio::reference_names().begin(),
