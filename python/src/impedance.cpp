@@ -65,7 +65,7 @@ void bind_impedance(py::module_& module) {
       [](const std::string& actuator, const py::object& impedance,
          const std::vector<std::pair<std::string, Model>>& models, double damping_Nms_rad,
          std::optional<double> torque_gain_Nm_rad, std::optional<double> bandwidth_rad_s,
-         std::optional<double> loop_damping, double correction_rad_s,
+         std::optional<double> loop_damping, std::optional<double> correction_rad_s,
          std::optional<double> amplitude_Nm, double duration_s, std::uint64_t seed) {
         ImpedanceSpec spec;
         set_impedance(spec, impedance);

@@ -43,6 +43,20 @@ def test_a_stiffness_that_is_too_large_and_wrong_calls_are_refused():
         ({"impedance": True}, "stiffness"),
         ({"impedance": "zero", "damping_Nms_rad": 1.0}, "damping_Nms_rad"),
         ({"impedance": 100.0, "duration_s": 1.0}, "duration"),
+        ({"impedance": 100.0, "correction_rad_s": 6.0}, "no estimate of a model corrects"),
     ]:
         with pytest.raises(torsio.UsageError, match=message):
             torsio.track_impedance(**arguments)
+
+
+def test_the_bandwidth_of_a_correction_is_checked(dataset):
+    call = {"actuator": "dfki-50", "impedance": 20.0, "damping_Nms_rad": 2.0, "duration_s": 10.0}
+    network = torsio.fit(dataset, "mlp", inputs="spring_deflection_rad", epochs=2)
+    for impossible in (float("nan"), 0.0, -1.0, float("inf"), 101.0):
+        with pytest.raises(torsio.UsageError, match="bandwidth of the correction"):
+            torsio.track_impedance(models={"net": network}, correction_rad_s=impossible, **call)
+    inverse = torsio.fit(dataset, "linear", inputs="spring_deflection_rad")
+    with pytest.raises(torsio.UsageError, match="no estimate of a model corrects"):
+        torsio.track_impedance(models={"line": inverse}, correction_rad_s=6.0, **call)
+    runs = torsio.track_impedance(models={"net": network}, correction_rad_s=2.0, **call).runs
+    assert [run["correction_rad_s"] for run in runs] == [None, 2.0]

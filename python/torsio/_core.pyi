@@ -414,7 +414,7 @@ def track_impedance(
     torque_gain_Nm_rad: float | None,
     bandwidth_rad_s: float | None,
     loop_damping: float | None,
-    correction_rad_s: float,
+    correction_rad_s: float | None,
     amplitude_Nm: float | None,
     duration_s: float,
     seed: int,

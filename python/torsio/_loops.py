@@ -148,7 +148,7 @@ def track_impedance(
     torque_gain_Nm_rad: float | None = None,
     bandwidth_rad_s: float | None = None,
     loop_damping: float | None = None,
-    correction_rad_s: float = 6.0,
+    correction_rad_s: float | None = None,
     amplitude_Nm: float | None = None,
     duration_s: float = 60.0,
     seed: int = 1,
@@ -158,12 +158,12 @@ def track_impedance(
 
     impedance: K in Nm/rad, with damping_Nms_rad; "zero", or for harmonic-drive "high" (gains of paper 004).
     models: each is the inverse of the spring in a run of its own, or, where it has none, its estimate corrects the
-    torque within correction_rad_s. Without models there is one run.
+    torque within correction_rad_s (6 by default; refused where no estimate corrects). Without models there is one run.
     torque_gain_Nm_rad: K_tp of the inner loop, only with a torsion tube (harmonic-drive).
     bandwidth_rad_s, loop_damping: of the torque loop through the spring, without a torsion tube.
     amplitude_Nm: of the sines at the output. duration_s: of the motion of a hand, 10 to 3600.
     Errors: UsageError for an impedance that is unstable, or with a torsion tube not passive up to 10 Hz: the message
-    states the largest stiffness that is. Equal arguments give equal results.
+    states the largest stiffness or the fastest correction that is. Equal arguments give equal results.
     """
     with shown(progress):
         text, records = _core.track_impedance(

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "control/controller_systems.hpp"
+#include "control/design/loop_design.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
@@ -40,17 +43,30 @@ double EstimateCorrection::step(double wanted_Nm, const Estimate& estimate,
   return correction_Nm_;
 }
 
-JointFeedback corrected_feedback(const JointFeedback& loop, const LinearSystem& impedance,
-                                 const LinearSystem& torque_path, double stiffness_Nm_rad,
-                                 double bandwidth_rad_s) {
+CorrectedParts corrected_parts(const JointFeedback& loop, const LinearSystem& impedance,
+                               const LinearSystem& torque_path, double stiffness_Nm_rad,
+                               double bandwidth_rad_s) {
   const double rate_Hz = torque_path.sample_rate_Hz();
   const auto gain = [&](double value) { return LinearSystem::gain(value, rate_Hz); };
   const LinearSystem correction =
       torque_path * (gain(bandwidth_rad_s) * LinearSystem::integrator(rate_Hz));
-  JointFeedback corrected = loop;
-  corrected.deflection = corrected.deflection + correction * gain(stiffness_Nm_rad);
-  corrected.joint = corrected.joint + correction * impedance;
-  return corrected;
+  JointFeedback others = loop;
+  others.joint = others.joint + correction * impedance;
+  return {std::move(others), correction * gain(stiffness_Nm_rad)};
+}
+
+JointFeedback all_parts(const CorrectedParts& parts, std::size_t ticks_per_estimate) {
+  JointFeedback all = parts.others;
+  all.deflection = all.deflection +
+                   parts.estimate * slow_hold(ticks_per_estimate, all.deflection.sample_rate_Hz());
+  return all;
+}
+
+JointFeedback corrected_feedback(const JointFeedback& loop, const LinearSystem& impedance,
+                                 const LinearSystem& torque_path, double stiffness_Nm_rad,
+                                 double bandwidth_rad_s, std::size_t ticks_per_estimate) {
+  return all_parts(corrected_parts(loop, impedance, torque_path, stiffness_Nm_rad, bandwidth_rad_s),
+                   ticks_per_estimate);
 }
 
 }  // namespace torsio

@@ -39,6 +39,14 @@ std::string task(const ImpedanceRun& run) {
   return fmt::format("{} impedance of paper 004", name(run.spec.kind));
 }
 
+/// The gains of `high` rely on the dry friction, which the linear model that checks the others does not have.
+std::string unchecked_text(const ImpedanceRun& run) {
+  if (run.spec.kind != Kind::high || !run.correction_rad_s) return {};
+  return "whether the correction by the estimate is stable is not checked: the linear model of the "
+         "check has no "
+         "dry friction;\n";
+}
+
 std::string passivity_text(const ImpedanceRun& run) {
   const std::string range =
       run.passive_to_Hz > 0.0 ? fmt::format("passive up to {:.4g} Hz", run.passive_to_Hz)
@@ -50,8 +58,8 @@ std::string passivity_text(const ImpedanceRun& run) {
           ? fmt::format("at most {:.4g} Nm/rad are", run.largest_passive_Nm_rad)
           : std::string("no stiffness is");
   return fmt::format(
-      "without dry friction {};\nwith this damping and these gains {} passive up to {:g} Hz\n",
-      range, limit, run.passive_goal_Hz);
+      "without dry friction {};\n{}with this damping and these gains {} passive up to {:g} Hz\n",
+      range, unchecked_text(run), limit, run.passive_goal_Hz);
 }
 
 std::string gains_text(const ImpedanceRun& run) {
@@ -63,9 +71,9 @@ std::string gains_text(const ImpedanceRun& run) {
 
 std::string model_text(const ImpedanceRun& run) {
   if (run.model.empty()) return {};
-  if (run.model_reason.empty()) return fmt::format("inverse of the spring: {}\n", run.model);
+  if (!run.correction_rad_s) return fmt::format("inverse of the spring: {}\n", run.model);
   return fmt::format("the estimate of {} corrects the torque below {:.3g} Hz, since {}\n",
-                     run.model, run.spec.correction_rad_s / kTurn, run.model_reason);
+                     run.model, *run.correction_rad_s / kTurn, run.model_reason);
 }
 
 std::string hand_text(const ImpedanceRun& run) {
@@ -129,6 +137,7 @@ Json document(const ImpedanceRun& run) {
           {"damping_Nms_rad", run.damping_Nms_rad},
           {"model", run.model.empty() ? Json(nullptr) : Json(run.model)},
           {"model_reason", run.model_reason.empty() ? Json(nullptr) : Json(run.model_reason)},
+          {"correction_rad_s", run.correction_rad_s ? Json(*run.correction_rad_s) : Json(nullptr)},
           {"gains", gains_json(run)},
           {"passive_to_Hz", run.passive_to_Hz},
           {"passive_goal_Hz", run.passive_goal_Hz},
@@ -170,9 +179,9 @@ std::string summary(std::span<const ImpedanceRun> runs) {
   for (const ImpedanceRun& run : runs) {
     const bool has_wanted = std::abs(run.points.front().wanted_Nm_rad) > 0.0;
     table.row({run.model.empty() ? "none" : run.model,
-               run.model.empty()          ? "-"
-               : run.model_reason.empty() ? "inverse"
-                                          : "correction",
+               run.model.empty()      ? "-"
+               : run.correction_rad_s ? "correction"
+                                      : "inverse",
                size_at(run, 0.1), size_at(run, 1.0),
                has_wanted ? fmt::format("{:.1f} %", 100.0 * error_of(run)) : "-",
                fmt::format("{:.3g}", run.hand.rms_to_wanted_Nm)});

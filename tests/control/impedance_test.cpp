@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <complex>
+#include <cstddef>
 #include <string>
 
 #include "control/controller_systems.hpp"
@@ -11,6 +14,7 @@
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
+#include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/estimate_correction.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/torque_controller.hpp"
@@ -361,6 +365,54 @@ TEST(EstimateCorrection, RefusesWhatIsImpossible) {
     const std::string refused = test::error_message([&] { EstimateCorrection({}, rate_Hz); });
     EXPECT_NE(refused.find("sample_rate_Hz"), std::string::npos) << refused;
   }
+}
+
+// A value that is held for N ticks is the mean of N delays.
+TEST(EstimateCorrection, HasTheDelayOfAHeldEstimate) {
+  for (const std::size_t ticks : {1U, 2U, 3U, 10U, 100U}) {
+    const LinearSystem hold = slow_hold(ticks, kRate_Hz);
+    EXPECT_LE(hold.spectral_radius(), 1.0);
+    const double third_rad_s = 2.0 * M_PI * kRate_Hz / static_cast<double>(ticks) / 3.0;
+    for (const double share : {0.01, 0.3, 0.6, 1.0}) {
+      const double rad_s = share * std::min(third_rad_s, 0.2 * M_PI * kRate_Hz);
+      std::complex<double> mean;
+      for (std::size_t delay = 0; delay < ticks; ++delay)
+        mean += std::polar(1.0 / static_cast<double>(ticks),
+                           -rad_s * static_cast<double>(delay) / kRate_Hz);
+      EXPECT_LT(std::abs(hold.response(rad_s) - mean), 0.03) << ticks << " ticks, " << share;
+    }
+  }
+}
+
+// With an estimate at every tick the loop with the hold is the ordinary one; with a slow one less bandwidth is stable.
+TEST(EstimateCorrection, HoldsAnEstimateInTheStabilityOfTheLoop) {
+  const SeriesElasticJoint joint = series_elastic_joint(data_sheet("dfki-50"));
+  const DeflectionController controller({.joint = joint}, kRate_Hz);
+  const auto gain = [](double value) { return LinearSystem::gain(value, kRate_Hz); };
+  const JointFeedback loop = controller.feedback();
+  const LinearSystem path = controller.reference_path() * gain(1.0 / joint.stiffness_Nm_rad);
+  int stable = 0;
+  int stable_if_slow = 0;
+  constexpr int kBandwidths = 56;
+  for (int n = 0; n < kBandwidths; ++n) {
+    const double bandwidth_rad_s = 0.05 * std::pow(1.2, n);
+    const auto whole =
+        corrected_feedback(loop, gain(0.0), path, joint.stiffness_Nm_rad, bandwidth_rad_s);
+    const auto parts =
+        corrected_parts(loop, gain(0.0), path, joint.stiffness_Nm_rad, bandwidth_rad_s);
+    const auto is_stable = [&](std::size_t ticks) {
+      return is_stable_held(joint, parts.others, parts.estimate, ticks, JointOutput::locked);
+    };
+    EXPECT_EQ(is_stable(1), is_stable_closed(open_loop(joint, whole, JointOutput::locked)))
+        << bandwidth_rad_s;
+    stable += is_stable(1) ? 1 : 0;
+    stable_if_slow += is_stable(200) ? 1 : 0;
+    // Within 5 s the torque follows, so that each estimate is that of the correction before: from 1 to 1 - 5 s times ω.
+    EXPECT_EQ(is_stable(5000), bandwidth_rad_s * 5.0 < 2.0) << bandwidth_rad_s;
+  }
+  EXPECT_GT(stable, 0);
+  EXPECT_LT(stable, kBandwidths);
+  EXPECT_LT(stable_if_slow, stable);
 }
 
 TEST(TubeImpedance, RefusesWhatItCannotRender) {

@@ -196,6 +196,10 @@ TEST_F(TrackVerb, RefusesContradictionsOfTheImpedance) {
           "a torsion tube before its gear");
   refused("--impedance 100Nm_rad --bandwidth 8Hz", "a torque loop through a spring");
   refused("--correction 1Hz", "no impedance is controlled");
+  refused("--impedance 100Nm_rad --correction 1Hz",
+          "there is no estimate that corrects the torque");
+  refused("--impedance 100Nm_rad --model linear --correction 1Hz", "it has no effect");
+  refused("--impedance 100Nm_rad --model linear --correction 0rad_s", "--correction");
   refused("--impedance 100Nm_rad --model nothing.safetensors", "nothing.safetensors: cannot open");
   refused("--impedance 1e6Nm_rad", "not passive up to 10 Hz");
   refused("--impedance stiff", "--impedance: expected high, zero or a stiffness");

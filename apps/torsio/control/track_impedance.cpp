@@ -122,10 +122,13 @@ void ImpedanceFlags::check(const CLI::App& verb) const {
                                       : "the gains of --impedance " + impedance + " are given",
          .expected = "a stiffness, --impedance 2000Nm_rad"});
   }
-  if (impedance.empty() && is_given("--correction"))
-    throw torsio::UsageError({.place = "--correction",
-                              .problem = "no impedance is controlled",
-                              .expected = "a stiffness, --impedance 2000Nm_rad"});
+  if (is_given("--correction") && (impedance.empty() || !is_given("--model")))
+    throw torsio::UsageError(
+        {.place = "--correction",
+         .problem = impedance.empty() ? "no impedance is controlled"
+                                      : "there is no estimate that corrects the torque",
+         .expected = impedance.empty() ? "a stiffness, --impedance 2000Nm_rad"
+                                       : "--model FILE, a model that has no inverse"});
   if (impedance.empty()) return;
   for (const char* flag : {"--joint-output", "--lever", "--reference", "--replay", "--mapping",
                            "--rate", "--friction", "--observer", "--feed-forward", "--limits",

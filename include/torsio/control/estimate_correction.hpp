@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <limits>
 
 #include "torsio/control/design/series_elastic_joint.hpp"
@@ -46,7 +47,10 @@ class EstimateCorrection {
 
 /// The feedback of a loop with the correction, the estimate being K δ:
 ///
-///     C_δ + G ω T / (z − 1) K,   C_q + G ω T / (z − 1) Z
+///     C_δ + G ω T / (z − 1) K H,   C_q + G ω T / (z − 1) Z
+///
+/// H is 1, or for an estimator that is stepped at every `ticks_per_estimate`-th tick and held in between an
+/// approximation of this by a low-pass, valid up to a third of the rate of the estimates.
 ///
 /// Allocates. @throws Error if the systems have different sample rates.
 /// @param impedance Z, from the joint's angle [rad] to −τ* [Nm]
@@ -54,6 +58,7 @@ class EstimateCorrection {
 [[nodiscard]] JointFeedback corrected_feedback(const JointFeedback& loop,
                                                const LinearSystem& impedance,
                                                const LinearSystem& torque_path,
-                                               double stiffness_Nm_rad, double bandwidth_rad_s);
+                                               double stiffness_Nm_rad, double bandwidth_rad_s,
+                                               std::size_t ticks_per_estimate = 1);
 
 }  // namespace torsio

@@ -43,6 +43,15 @@ LinearSystem first_order(double a, double b, double c, double d, double sample_r
   return LinearSystem({number(a), number(b), number(c), number(d)}, sample_rate_Hz);
 }
 
+/// b0 (1 + 2 z⁻¹ + z⁻²) / (1 + a1 z⁻¹ + a2 z⁻²) in controller form.
+LinearSystem second_order(double b0, double a1, double a2, double sample_rate_Hz) {
+  LinearSystem::Matrices matrices{Matrix(2, 2), Matrix(2, 1), Matrix(1, 2), Matrix(1, 1, b0)};
+  matrices.a.values = {-a1, -a2, 1.0, 0.0};
+  matrices.b.values = {1.0, 0.0};
+  matrices.c.values = {b0 * (2.0 - a1), b0 * (1.0 - a2)};
+  return {std::move(matrices), sample_rate_Hz};
+}
+
 void require_fit(bool fits, const char* what, std::size_t expected, std::size_t found) {
   if (fits) return;
   throw Error({.place = kPlace,
@@ -105,19 +114,41 @@ LinearSystem LinearSystem::difference(double sample_rate_Hz) {
   return first_order(0.0, 1.0, -sample_rate_Hz, sample_rate_Hz, sample_rate_Hz);
 }
 
-// The bilinear transform of 1 / ((s/w)^2 + sqrt(2) s/w + 1), prewarped, in controller form.
+// The bilinear transform of 1 / ((s/w)^2 + sqrt(2) s/w + 1), prewarped.
 LinearSystem LinearSystem::lowpass(double cutoff_Hz, double sample_rate_Hz) {
   static_cast<void>(Lowpass(cutoff_Hz, sample_rate_Hz));  // refuses what it cannot be
   const double g = std::tan(std::numbers::pi * cutoff_Hz / sample_rate_Hz);
   const double whole = 1.0 + g * (g + std::numbers::sqrt2);
-  const double a1 = 2.0 * (g * g - 1.0) / whole;
-  const double a2 = (1.0 + g * (g - std::numbers::sqrt2)) / whole;
-  const double b0 = g * g / whole;
-  Matrices matrices{Matrix(2, 2), Matrix(2, 1), Matrix(1, 2), Matrix(1, 1, b0)};
-  matrices.a.values = {-a1, -a2, 1.0, 0.0};
-  matrices.b.values = {1.0, 0.0};
-  matrices.c.values = {b0 * (2.0 - a1), b0 * (1.0 - a2)};
-  return {std::move(matrices), sample_rate_Hz};
+  return second_order(g * g / whole, 2.0 * (g * g - 1.0) / whole,
+                      (1.0 + g * (g - std::numbers::sqrt2)) / whole, sample_rate_Hz);
+}
+
+// The delays 0 to N − 1 have the mean (N − 1) / 2 and the variance (N² − 1) / 12, as 1 / (1 + f s + g s²) has with these
+// factors; by the bilinear transform.
+LinearSystem slow_hold(std::size_t ticks, double sample_rate_Hz) {
+  if (ticks <= 1) return LinearSystem::gain(1.0, sample_rate_Hz);
+  const double last = static_cast<double>(ticks) - 1.0;
+  const double first_order = last;                   // 2 f
+  const double squares = last * (last - 1.0) / 3.0;  // 4 g
+  const double whole = 1.0 + first_order + squares;
+  return second_order(1.0 / whole, 2.0 * (1.0 - squares) / whole,
+                      (1.0 - first_order + squares) / whole, sample_rate_Hz);
+}
+
+// [A B; 0 1] to the power of the ticks.
+LinearSystem::Matrices over_ticks(const LinearSystem& system, std::size_t ticks) {
+  const auto& [a, b, c, d] = system.matrices();
+  const auto states = static_cast<Index>(system.order());
+  const auto inputs = static_cast<Index>(system.input_count());
+  RowMajor power = joined(row_major_map(a), row_major_map(b), zeros(inputs, states),
+                          RowMajor::Identity(inputs, inputs));
+  RowMajor all = RowMajor::Identity(states + inputs, states + inputs);
+  for (std::size_t left = ticks; left > 0; left /= 2) {
+    if (left % 2 == 1) all = all * power;
+    if (left > 1) power = power * power;
+  }
+  return {table(all.topLeftCorner(states, states)), table(all.topRightCorner(states, inputs)), c,
+          d};
 }
 
 std::complex<double> LinearSystem::response(double frequency_rad_s, std::size_t output,

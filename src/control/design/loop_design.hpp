@@ -1,6 +1,7 @@
 #pragma once
 
 #include <complex>
+#include <cstddef>
 #include <string_view>
 
 #include "torsio/control/design/linear_system.hpp"
@@ -18,6 +19,20 @@ namespace torsio {
 /// The loop cut at the current: feedback, one sample of delay, hold, joint.
 [[nodiscard]] LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
                                      JointOutput output);
+
+/// A value that is taken at every `ticks`-th tick and held in between, for the frequency response: a low-pass of second
+/// order with the mean delay of the hold, (ticks − 1) / 2, and the variance of its delay. Near half the rate of the
+/// values and above it is not valid; 1 for one tick.
+[[nodiscard]] LinearSystem slow_hold(std::size_t ticks, double sample_rate_Hz);
+
+/// The same system in one step of `ticks` ticks, in which its input is held. The numbers of an unstable system may be
+/// too large to be finite.
+[[nodiscard]] LinearSystem::Matrices over_ticks(const LinearSystem& system, std::size_t ticks);
+
+/// Whether the loop is stable if `held`, a part of its feedback from the deflection besides `feedback`, has its input
+/// taken at every `ticks`-th tick and held in between. Exact, for any number of ticks.
+[[nodiscard]] bool is_stable_held(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                                  const LinearSystem& held, std::size_t ticks, JointOutput output);
 
 /// H(jω) of `impedance`: from the wanted current to the torque of the drive at the joint.
 [[nodiscard]] std::complex<double> current_path(const SeriesElasticJoint& joint,

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "control/design/loop_design.hpp"
 #include "core/checks.hpp"
@@ -17,19 +19,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-}  // namespace
-
-void SeriesElasticJoint::check() const {
-  drive.check();
-  constexpr auto kPlace = "series-elastic joint";
-  require_positive(kPlace, "stiffness_Nm_rad", stiffness_Nm_rad);
-  require_positive(kPlace, "joint_inertia_kg_m2", joint_inertia_kg_m2);
-  require_not_negative(kPlace, "joint_viscous_Nms_rad", joint_viscous_Nms_rad);
-}
-
 // States δ, θ̇, i, and with a free output q̇, q; outputs δ, θ̇, q.
-LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
-                       JointOutput output) {
+LinearSystem::Matrices joint_plant(const SeriesElasticJoint& joint, JointOutput output) {
   joint.check();
   const Drive& drive = joint.drive;
   const bool is_free = output == JointOutput::free;
@@ -52,10 +43,64 @@ LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& fee
     a(4, 3) = 1.0;
     plant.c(2, 4) = 1.0;
   }
+  return plant;
+}
+
+LinearSystem all_feedback(const JointFeedback& feedback) {
+  return side_by_side(side_by_side(feedback.deflection, feedback.speed), feedback.joint);
+}
+
+bool is_finite(const Matrix& matrix) {
+  return std::ranges::all_of(matrix.values, [](double value) { return std::isfinite(value); });
+}
+
+}  // namespace
+
+void SeriesElasticJoint::check() const {
+  drive.check();
+  constexpr auto kPlace = "series-elastic joint";
+  require_positive(kPlace, "stiffness_Nm_rad", stiffness_Nm_rad);
+  require_positive(kPlace, "joint_inertia_kg_m2", joint_inertia_kg_m2);
+  require_not_negative(kPlace, "joint_viscous_Nms_rad", joint_viscous_Nms_rad);
+}
+
+LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                       JointOutput output) {
   const double rate_Hz = feedback.deflection.sample_rate_Hz();
-  const LinearSystem all =
-      side_by_side(side_by_side(feedback.deflection, feedback.speed), feedback.joint);
-  return LinearSystem::delay(rate_Hz) * all * LinearSystem::held(plant, rate_Hz);
+  return LinearSystem::delay(rate_Hz) * all_feedback(feedback) *
+         LinearSystem::held(joint_plant(joint, output), rate_Hz);
+}
+
+// The held deflection is a second input, and a fourth output of the joint that leads to `held`. With the current closed
+// the loop is one from the held deflection to the deflection, which a step of `ticks` ticks closes.
+bool is_stable_held(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                    const LinearSystem& held, std::size_t ticks, JointOutput output) {
+  const double rate_Hz = feedback.deflection.sample_rate_Hz();
+  LinearSystem::Matrices plant = LinearSystem::held(joint_plant(joint, output), rate_Hz).matrices();
+  const std::size_t states = plant.a.rows;
+  Matrix b(states, 2);
+  Matrix c(4, states);
+  Matrix d(4, 2);
+  for (std::size_t state = 0; state < states; ++state) {
+    b(state, 0) = plant.b(state, 0);
+    for (std::size_t row = 0; row < 3; ++row) c(row, state) = plant.c(row, state);
+  }
+  d(3, 1) = 1.0;
+  const LinearSystem both({plant.a, std::move(b), std::move(c), std::move(d)}, rate_Hz);
+  const LinearSystem open =
+      LinearSystem::delay(rate_Hz) * side_by_side(all_feedback(feedback), held) * both;
+  const LinearSystem::Matrices& loop = open.matrices();
+  LinearSystem::Matrices cut{Matrix(loop.a.rows, loop.a.rows), Matrix(loop.a.rows, 1),
+                             Matrix(1, loop.a.rows), Matrix(1, 1)};
+  for (std::size_t row = 0; row < loop.a.rows; ++row) {
+    cut.b(row, 0) = loop.b(row, 1);
+    for (std::size_t column = 0; column < loop.a.rows; ++column)
+      cut.a(row, column) = loop.a(row, column) - loop.b(row, 0) * loop.c(0, column);
+  }
+  cut.c(0, 0) = -1.0;  // the deflection is the first state; negative, since `closed` subtracts it
+  const LinearSystem::Matrices period = over_ticks(LinearSystem(cut, rate_Hz), ticks);
+  return is_finite(period.a) && is_finite(period.b) &&
+         is_stable_closed(LinearSystem(period, rate_Hz / static_cast<double>(ticks)));
 }
 
 void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output) {

@@ -50,8 +50,17 @@ LinearSystem torque_path(const ImpedancePlan::Spring& spring) {
          LinearSystem::gain(1.0 / spring.torque.deflection.joint.stiffness_Nm_rad, kBenchRate_Hz);
 }
 
-JointFeedback corrected(const ImpedancePlan& plan, const JointFeedback& loop) {
-  if (!plan.estimator) return loop;
+SeriesElasticJoint joint_of(const ImpedancePlan& plan) {
+  return std::visit([](const auto& controller) { return joint_of(controller); }, plan.controller);
+}
+
+JointFeedback feedback_of(const ImpedancePlan& plan) {
+  return std::visit([](const auto& controller) { return feedback_of(controller); },
+                    plan.controller);
+}
+
+std::optional<CorrectedParts> corrected(const ImpedancePlan& plan) {
+  if (!plan.estimator) return std::nullopt;
   const auto gain = [](double value) { return LinearSystem::gain(value, kBenchRate_Hz); };
   LinearSystem impedance = gain(plan.stiffness_Nm_rad());
   if (plan.damping_Nms_rad() > 0.0)
@@ -60,9 +69,9 @@ JointFeedback corrected(const ImpedancePlan& plan, const JointFeedback& loop) {
                                  LinearSystem::difference(kBenchRate_Hz));
   return std::visit(
       [&](const auto& controller) {
-        return corrected_feedback(loop, impedance, torque_path(controller),
-                                  joint_of(controller).stiffness_Nm_rad,
-                                  plan.correction.bandwidth_rad_s);
+        return corrected_parts(feedback_of(controller), impedance, torque_path(controller),
+                               joint_of(controller).stiffness_Nm_rad,
+                               plan.correction.bandwidth_rad_s);
       },
       plan.controller);
 }
@@ -127,6 +136,12 @@ double ImpedancePlan::damping_Nms_rad() const {
   return tube.gains.damping_s * TubeImpedance::torque_per_twist(tube);
 }
 
+std::size_t ImpedancePlan::ticks_per_estimate() const {
+  if (!estimator) return 1;
+  return static_cast<std::size_t>(
+      std::lround(kBenchRate_Hz / estimator->settings().sample_rate_Hz));
+}
+
 double ImpedancePlan::largest_passive_Nm_rad(double passive_to_Hz) const {
   const double rad_s = kRadPerTurn * passive_to_Hz;
   if (const auto* const spring = std::get_if<Spring>(&controller))
@@ -146,22 +161,26 @@ ImpedancePlan impedance_plan(const DataSheet& sheet, const ImpedanceSpec& spec,
     plan.controller = spring_settings(sheet, spec, inverse != nullptr ? *inverse : line);
   if (model != nullptr && inverse == nullptr) {
     plan.estimator = std::get<Estimator>(model->use);
-    plan.correction = {.bandwidth_rad_s = spec.correction_rad_s,
+    plan.correction = {.bandwidth_rad_s = spec.correction_rad_s.value_or(
+                           EstimateCorrection::Settings{}.bandwidth_rad_s),
                        .torque_Nm = sheet.rating.torque_Nm.value};
   }
   return plan;
 }
 
 LinearImpedance::LinearImpedance(const ImpedancePlan& plan)
-    : joint_(
-          std::visit([](const auto& controller) { return joint_of(controller); }, plan.controller)),
-      feedback_(
-          corrected(plan, std::visit([](const auto& controller) { return feedback_of(controller); },
-                                     plan.controller))) {}
+    : joint_(joint_of(plan)),
+      ticks_per_estimate_(plan.ticks_per_estimate()),
+      corrected_(corrected(plan)),
+      feedback_(corrected_ ? all_parts(*corrected_, ticks_per_estimate_) : feedback_of(plan)) {}
 
 bool LinearImpedance::is_stable() const {
-  return is_stable_closed(open_loop(joint_, feedback_, JointOutput::locked)) &&
-         is_stable_closed(open_loop(joint_, feedback_, JointOutput::free));
+  const auto is_stable_for = [&](JointOutput output) {
+    return corrected_ ? is_stable_held(joint_, corrected_->others, corrected_->estimate,
+                                       ticks_per_estimate_, output)
+                      : is_stable_closed(open_loop(joint_, feedback_, output));
+  };
+  return is_stable_for(JointOutput::locked) && is_stable_for(JointOutput::free);
 }
 
 double LinearImpedance::passive_to_Hz() const {
@@ -192,8 +211,7 @@ ImpedanceLoop::ImpedanceLoop(const ImpedancePlan& plan)
   correction_.emplace(plan.correction, kBenchRate_Hz);
   inputs_ = sensed_inputs(*plan.sheet, estimator_->raw_inputs(), kImpedanceLoop);
   raw_.resize(inputs_.size());
-  ticks_per_estimate_ =
-      static_cast<std::size_t>(std::lround(kBenchRate_Hz / estimator_->settings().sample_rate_Hz));
+  ticks_per_estimate_ = plan.ticks_per_estimate();
 }
 
 ImpedanceLoop::Output ImpedanceLoop::step(double t_s, const Measurement& measured) noexcept {

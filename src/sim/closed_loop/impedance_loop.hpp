@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "control/controller_systems.hpp"
 #include "sim/sensors/sensed_channels.hpp"
 #include "sim/sensors/sensor_set.hpp"
 #include "torsio/control/estimate_correction.hpp"
@@ -34,6 +35,7 @@ struct ImpedancePlan {
 
   [[nodiscard]] double stiffness_Nm_rad() const;
   [[nodiscard]] double damping_Nms_rad() const;
+  [[nodiscard]] std::size_t ticks_per_estimate() const;  ///< 1 without an estimator
   /// The largest stiffness that is passive up to this frequency with the same damping.
   [[nodiscard]] double largest_passive_Nm_rad(double passive_to_Hz) const;
 };
@@ -42,7 +44,8 @@ struct ImpedancePlan {
 [[nodiscard]] ImpedancePlan impedance_plan(const DataSheet& sheet, const ImpedanceSpec& spec,
                                            const ImpedanceModel* model, const LinearInverse& line);
 
-/// The joint with the loop of a plan, without dry friction.
+/// The joint with the loop of a plan, without dry friction. That an estimate is held for several ticks is exact in
+/// `is_stable` and approximated in the others (`corrected_feedback`).
 class LinearImpedance {
  public:
   explicit LinearImpedance(const ImpedancePlan& plan);
@@ -55,7 +58,9 @@ class LinearImpedance {
 
  private:
   SeriesElasticJoint joint_;
-  JointFeedback feedback_;
+  std::size_t ticks_per_estimate_;
+  std::optional<CorrectedParts> corrected_;  ///< with an estimator
+  JointFeedback feedback_;                   ///< with all parts
 };
 
 /// The loop of a plan, tick by tick at `kBenchRate_Hz`; its reference is rest at 0 rad.

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "ideal_tube.hpp"
 #include "support/error_message.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/units.hpp"
@@ -25,24 +26,8 @@ const ImpedanceSpec kSoft = {.kind = ImpedanceSpec::Kind::wanted,
                              .damping_Nms_rad = 30.0,
                              .duration_s = 10.0};
 
-/// Without dry friction, gear errors, torque ripple and noise, its gear ten times as stiff.
-DataSheet ideal() {
-  DataSheet sheet = data_sheet("harmonic-drive");
-  for (SheetValue* value :
-       {&sheet.friction.coulomb_Nm, &sheet.friction.load_factor, &sheet.motor.torque_ripple,
-        &sheet.joint.bearing_friction_Nm, &sheet.sensors.encoder_jitter_lsb})
-    *value = assumed(0.0);
-  auto& gear = std::get<GearSheet>(sheet.second);
-  gear.hysteresis_rad = gear.error_2_rad = assumed(0.0);
-  gear.stiffness_Nm_rad = assumed(1e6);
-  for (SheetValue* bits : {&sheet.sensors.motor_encoder_bits, &sheet.sensors.middle_encoder_bits,
-                           &sheet.sensors.joint_encoder_bits})
-    *bits = assumed(30.0);
-  return sheet;
-}
-
 const ImpedanceRun& ideal_run() {
-  static const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  static const ImpedanceRun run = track_impedance(test::ideal_tube(), kSoft, 1);
   return run;
 }
 

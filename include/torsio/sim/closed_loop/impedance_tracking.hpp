@@ -36,7 +36,9 @@ struct ImpedanceSpec {
   /// 100 rad/s with an elastomer coupling.
   std::optional<double> bandwidth_rad_s = {};
   std::optional<double> loop_damping = {};  ///< its damping; none: 0.9
-  double correction_rad_s = 6.0;            ///< bandwidth of an `EstimateCorrection`
+  /// Bandwidth of the correction by an estimate, up to 100 rad/s, only with a model that is an
+  /// estimator; none: that of `EstimateCorrection`.
+  std::optional<double> correction_rad_s = {};
   /// Amplitude of the sines at the output, up to 50 Nm or the rated torque; none: 20 Nm with a
   /// torsion tube, else a fifth of the rated torque.
   std::optional<double> amplitude_Nm = {};
@@ -105,6 +107,8 @@ struct ImpedanceRun {
   std::uint64_t seed = 1;
   std::string model;         ///< name of the model; empty with a torsion tube: none
   std::string model_reason;  ///< as `ImpedanceModel::reason`
+  std::optional<double> correction_rad_s =
+      {};  ///< bandwidth of the correction; none: there is none
   double amplitude_Nm = 0.0;
   std::optional<TubeImpedance::Gains> tube = {};  ///< with a torsion tube
   std::optional<Pid::Gains> deflection = {};      ///< [A/rad], without
@@ -133,9 +137,10 @@ struct ImpedanceRun {
 /// Closes the impedance loop on the simulated bench with its sensors, at 1 kHz: sines of torque at
 /// the output, one run for each frequency, and then the hand. Equal arguments give equal results.
 /// @param model none: the gains of a torsion tube, or `spring_line`
-/// @throws UsageError if a value is out of range, the loop is unstable without dry friction, or the
-/// wanted impedance of a torsion tube is not passive up to `kPassiveTo_Hz` (the message states the
-/// largest stiffness that is); Error if the loop diverges; Cancelled.
+/// @throws UsageError if a value is out of range or has no effect, the loop is unstable without dry
+/// friction, or the wanted or, with an estimate, zero impedance of a torsion tube is not passive up to
+/// `kPassiveTo_Hz` (the message states the largest stiffness that is, or the fastest correction); Error if
+/// the loop diverges; Cancelled.
 [[nodiscard]] ImpedanceRun track_impedance(const DataSheet& sheet, const ImpedanceSpec& spec,
                                            const std::optional<ImpedanceModel>& model,
                                            std::uint64_t seed, const Progress& progress = {});
