@@ -54,6 +54,12 @@ ResultRow failed_row(const ModelChoice& choice, const Error& error) {
 InputSets::InputSets(const Dataset& dataset, bool allow_leak)
     : dataset_(dataset), allow_leak_(allow_leak) {}
 
+InputSets::InputSets(const Dataset& dataset, InputSets& examined)
+    : dataset_(dataset), allow_leak_(examined.allow_leak_) {
+  const std::scoped_lock lock(examined.guard_);
+  leaks_ = examined.leaks_;
+}
+
 std::string InputSets::leak_of(const FeatureSpec& features) {
   const std::scoped_lock lock(guard_);
   for (const auto& [known, leak] : leaks_)

@@ -23,6 +23,9 @@ class InputSets {
  public:
   /// @param dataset must outlive this.
   InputSets(const Dataset& dataset, bool allow_leak);
+  /// @param examined those of a dataset with the same recordings, or more of them: its leaks are not
+  /// searched for again.
+  InputSets(const Dataset& dataset, InputSets& examined);
 
   /// An input that the target was computed from, or empty. @throws UsageError as `refuse_leak`.
   [[nodiscard]] std::string leak_of(const FeatureSpec& features);

@@ -107,7 +107,7 @@ void add_share_of(const DatasetRecord& record, double share, std::vector<Dataset
 
 /// The recordings with the roles of a fold, for all threads.
 struct FoldData {
-  FoldData(Dataset own, bool allow_leak) : dataset(std::move(own)), inputs(dataset, allow_leak) {}
+  FoldData(Dataset own, InputSets& examined) : dataset(std::move(own)), inputs(dataset, examined) {}
   Dataset dataset;
   InputSets inputs;
 };
@@ -120,10 +120,10 @@ class StructureStudy::Plan {
       : dataset_(std::move(dataset)),
         candidates_(std::move(candidates)),
         settings_(settings),
-        folds_(dataset_, {.folds = settings.folds}, candidates_, settings.seed) {
+        folds_(dataset_, {.folds = settings.folds}, candidates_, settings.seed),
+        inputs_(dataset_, settings.allow_leak) {
     // A wrong setting or a leak is found before any fit.
-    InputSets inputs(dataset_, settings_.allow_leak);
-    for (const ModelChoice& choice : candidates_) (void)inputs.leak_of(choice.features);
+    for (const ModelChoice& choice : candidates_) (void)inputs_.leak_of(choice.features);
     samples_ = samples_with_role(dataset_, Role::train);
   }
 
@@ -299,7 +299,7 @@ class StructureStudy::Plan {
         add_share_of(record, effort_of(step), records);
       dataset.records = std::move(records);
     }
-    known = std::make_shared<FoldData>(std::move(dataset), settings_.allow_leak);
+    known = std::make_shared<FoldData>(std::move(dataset), inputs_);
     return known;
   }
 
@@ -336,6 +336,7 @@ class StructureStudy::Plan {
   std::vector<ModelChoice> candidates_;
   SearchSettings settings_;
   FoldScores folds_;
+  InputSets inputs_;
   std::size_t samples_ = 0;
   std::mutex guard_;
   std::map<std::pair<std::size_t, int>, std::shared_ptr<FoldData>> data_;

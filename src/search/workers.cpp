@@ -9,9 +9,11 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <limits>
 #include <list>
 #include <mutex>
 #include <optional>
+#include <random>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -55,9 +57,12 @@ class Workers {
     threads_ = options.threads == 0 ? usual_threads() : options.threads;
     if (options_.name.empty()) options_.name = worker_name();
     if (store.address().kind != StoreAddress::Kind::memory)
-      own_store_.emplace(store.address(), [this](const std::string& reason) {
-        return !stop_ && (!options_.on_wait || options_.on_wait(reason));
-      });
+      own_store_.emplace(
+          store.address(),
+          [this](const std::string& reason) {
+            return !stop_ && (!options_.on_wait || options_.on_wait(reason));
+          },
+          std::numeric_limits<double>::infinity());
   }
 
   WorkersReport run(const Progress& progress) {
@@ -108,9 +113,8 @@ class Workers {
     auto pause = kPoll;
     auto last_claim = Clock::now();
     while (!stop_) {
-      const std::optional<Claim> claim = store_.claim(study_.id, options_.name, options_.lease_s);
-      if (claim) {
-        run_trial(*claim);
+      if (RunningTrial* const trial = claim()) {
+        run_trial(*trial);
         advance();
         pause = kPoll;
         last_claim = Clock::now();
@@ -120,9 +124,8 @@ class Workers {
       const StudyCounts counts = store_.counts(study_.id);
       if (counts.is_complete() && !advance()) return;
       // Others run the rest. One of them that was killed loses its trial within a lease.
-      constexpr double kPatience = 1.5;
       if (!options_.until_complete && counts.waiting == 0 && !may_get_more() &&
-          seconds_since(last_claim) > kPatience * options_.lease_s)
+          seconds_since(last_claim) > kWorkerPatience * options_.lease_s)
         return;
       std::unique_lock lock(guard_);
       changed_.wait_for(lock, pause, [this] { return stop_.load(); });
@@ -136,15 +139,24 @@ class Workers {
     return !running_.empty();
   }
 
-  bool advance() {
-    return store_.advance(
-        study_.id, [this](const std::string& group, int step, std::span<const TrialRecord> trials) {
-          return kind_.decide(group, step, trials);
-        });
+  bool advance() { return torsio::advance(store_, study_, kind_); }
+
+  /// One thread at a time: a trial that runs alone must not begin together with another one.
+  RunningTrial* claim() {
+    const std::scoped_lock lock(claiming_);
+    bool runs_nothing = false;
+    {
+      const std::scoped_lock state_lock(guard_);
+      if (!running_.empty() && running_.front().claim.runs_alone) return nullptr;
+      runs_nothing = running_.empty();
+    }
+    const std::optional<Claim> claim =
+        store_.claim(study_.id, options_.name, options_.lease_s, runs_nothing);
+    return claim ? add(*claim) : nullptr;
   }
 
-  void run_trial(const Claim& claim) {
-    RunningTrial& trial = *add(claim);
+  void run_trial(RunningTrial& trial) {
+    const Claim& claim = trial.claim;
     struct Removal {
       Workers& workers;
       const RunningTrial& trial;
@@ -154,15 +166,16 @@ class Workers {
     const auto begin = Clock::now();
     TrialResult result;
     try {
+      {
+        const std::scoped_lock lock(guard_);
+        trial.label = kind_.label(claim);
+      }
       result = kind_.run(claim, [&](double fraction, std::string_view) {
         trial.fraction.store(fraction, std::memory_order_relaxed);
         return !stop_ && !trial.is_lost;
       });
     } catch (const Cancelled&) {
-      if (trial.is_lost) {
-        ++lost_;
-        return;
-      }
+      if (trial.is_lost) return count_lost(claim);
       store_.give_back(claim);
       throw;
     } catch (const Error&) {
@@ -170,14 +183,32 @@ class Workers {
       throw;
     }
     result.seconds = seconds_since(begin);
-    ++(store_.finish(claim, result) ? finished_ : lost_);
+    if (!finish(claim, result)) return count_lost(claim);
+    ++finished_;
+  }
+
+  bool finish(const Claim& claim, const TrialResult& result) {
+    try {
+      return store_.finish(claim, result);
+    } catch (const Error&) {
+      // The result cannot be written, for example to a full disk: that the trial waits again may be.
+      try {
+        store_.give_back(claim);
+      } catch (const Error&) {  // the first error is the one to report
+      }
+      throw;
+    }
+  }
+
+  void count_lost(const Claim& claim) {
+    ++lost_;
+    store_.withdraw_loss(claim);
   }
 
   RunningTrial* add(const Claim& claim) {
     const std::scoped_lock lock(guard_);
     RunningTrial& trial = running_.emplace_back();
     trial.claim = claim;
-    trial.label = kind_.label(claim);
     share_ = std::max<std::size_t>(1, threads_ / running_.size());
     return &trial;
   }
@@ -255,6 +286,7 @@ class Workers {
   std::size_t threads_ = 1;
   std::optional<StudyStore> own_store_;
 
+  std::mutex claiming_;
   std::mutex guard_;
   std::condition_variable changed_;
   std::list<RunningTrial> running_;
@@ -279,10 +311,19 @@ WorkersReport run_workers(StudyStore& store, const StoredStudy& study, StudyKind
   return Workers(store, study, kind, options).run(progress);
 }
 
+bool advance(StudyStore& store, const StoredStudy& study, StudyKind& kind) {
+  return store.advance(
+      study.id, [&](const std::string& group, int step, std::span<const TrialRecord> trials) {
+        return kind.decide(group, step, trials);
+      });
+}
+
 std::string worker_name() {
+  // A process in a container often has the number that the one before it had.
+  static const auto token = std::random_device()();
   std::array<char, 256> host{};
   if (gethostname(host.data(), host.size() - 1) != 0) host[0] = '\0';
-  return fmt::format("{}:{}", host[0] == '\0' ? "host" : host.data(), getpid());
+  return fmt::format("{}:{}:{:08x}", host[0] == '\0' ? "host" : host.data(), getpid(), token);
 }
 
 }  // namespace torsio

@@ -27,7 +27,13 @@ using DatabaseRow = std::vector<DatabaseValue>;
 /// about to be committed, may have: the caller repeats it.
 class ConnectionLost : public Error {
  public:
-  using Error::Error;
+  /// @param is_temporary the server is there, but starts, ends or has no connection left
+  explicit ConnectionLost(ErrorReport report, bool is_temporary = false)
+      : Error(std::move(report)), is_temporary_(is_temporary) {}
+  [[nodiscard]] bool is_temporary() const noexcept { return is_temporary_; }
+
+ private:
+  bool is_temporary_ = false;
 };
 
 /// One connection to SQLite or PostgreSQL. The statements of torsio are written for both: parameters

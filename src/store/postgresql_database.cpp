@@ -23,6 +23,8 @@ constexpr Oid kText = 25;
 constexpr Oid kFloat4 = 700;
 constexpr Oid kFloat8 = 701;
 
+constexpr const char* kUrlExample = "one such as postgresql://user@host:5432/torsio";
+
 /// The functions of libpq that are used here.
 struct Libpq {
   decltype(&::PQclear) clear = nullptr;
@@ -39,6 +41,7 @@ struct Libpq {
   decltype(&::PQgetvalue) value = nullptr;
   decltype(&::PQnfields) fields = nullptr;
   decltype(&::PQntuples) rows = nullptr;
+  decltype(&::PQpingParams) ping = nullptr;
   decltype(&::PQresultErrorField) result_error_field = nullptr;
   decltype(&::PQresultErrorMessage) result_error_message = nullptr;
   decltype(&::PQresultStatus) result_status = nullptr;
@@ -73,6 +76,7 @@ const Libpq& libpq() {
     load("PQgetvalue", functions.value);
     load("PQnfields", functions.fields);
     load("PQntuples", functions.rows);
+    load("PQpingParams", functions.ping);
     load("PQresultErrorField", functions.result_error_field);
     load("PQresultErrorMessage", functions.result_error_message);
     load("PQresultStatus", functions.result_status);
@@ -98,12 +102,19 @@ struct ClearResult {
 };
 using PostgresqlResult = std::unique_ptr<PGresult, ClearResult>;
 
-/// A message of the server without its line breaks and the word FATAL.
+/// A message of libpq or of the server in one line.
 std::string one_line(std::string_view text) {
   std::string line;
-  for (const char c : text) line += c == '\n' || c == '\t' ? ' ' : c;
-  while (!line.empty() && line.back() == ' ') line.pop_back();
+  for (const char c : text) {
+    const char printed = c == '\n' || c == '\t' ? ' ' : c;
+    if (printed != ' ' || !line.ends_with(' ')) line += printed;
+  }
+  while (line.ends_with(' ')) line.pop_back();
   return line;
+}
+
+bool contains(std::string_view text, std::string_view part) {
+  return text.find(part) != std::string_view::npos;
 }
 
 class PostgresqlDatabase final : public Database {
@@ -187,14 +198,34 @@ class PostgresqlDatabase final : public Database {
   std::string_view bytes_type() const noexcept override { return "BYTEA"; }
 
  private:
-  void connect() {
+  /// Calls a function of libpq that has the parameters of a connection.
+  template <class Function>
+  auto call_with_url(Function function, const char* timeout_s) const {
     constexpr auto kKeywords = std::to_array<const char*>(
         {"dbname", "application_name", "connect_timeout", "keepalives", "keepalives_idle",
          "keepalives_interval", "keepalives_count", "client_encoding", nullptr});
     const auto values = std::to_array<const char*>(
-        {url_.c_str(), "torsio", "10", "1", "20", "5", "3", "UTF8", nullptr});
-    connection_.reset(libpq().connect(kKeywords.data(), values.data(), 1));
-    if (libpq().status(connection_.get()) != CONNECTION_OK) refuse_connection();
+        {url_.c_str(), "torsio", timeout_s, "1", "20", "5", "3", "UTF8", nullptr});
+    return function(kKeywords.data(), values.data(), 1);
+  }
+
+  void connect() {
+    PGPing state = PQPING_OK;
+    // Where the server takes connections a moment later, it had just ended its start.
+    for (int attempt = 0; attempt < 2 && state == PQPING_OK; ++attempt) {
+      connection_.reset(call_with_url(libpq().connect, "10"));
+      if (libpq().status(connection_.get()) == CONNECTION_OK) {
+        prepare_session();
+        was_connected_ = true;
+        return;
+      }
+      if (libpq().needs_password(connection_.get()) != 0) break;
+      state = call_with_url(libpq().ping, "5");
+    }
+    refuse_connection(state);
+  }
+
+  void prepare_session() {
     libpq().set_notice_processor(
         connection_.get(), [](void*, const char*) {}, nullptr);
     // A transaction that lasts pins old rows for all other workers: none of torsio's takes seconds.
@@ -203,26 +234,54 @@ class PostgresqlDatabase final : public Database {
         "SET synchronous_commit = on");
   }
 
-  [[noreturn]] void refuse_connection() const {
+  /// @param state of the server; what it is about is not in the error of a connection, but for a text
+  /// in the language of the server.
+  [[noreturn]] void refuse_connection(PGPing state) const {
     const std::string reason = one_line(libpq().error_message(connection_.get()));
-    const bool wrong_login = libpq().needs_password(connection_.get()) != 0 ||
-                             reason.find("authentication failed") != std::string::npos ||
-                             (reason.find("role") != std::string::npos &&
-                              reason.find("does not exist") != std::string::npos);
-    if (wrong_login)
+    if (state == PQPING_NO_ATTEMPT)  // the reason may have the whole URL with its password
+      throw Error({.place = name_, .problem = "this URL cannot be read", .expected = kUrlExample});
+    if (libpq().needs_password(connection_.get()) != 0 ||
+        contains(reason, "authentication failed") || contains(reason, "pg_hba.conf") ||
+        (contains(reason, "role") && contains(reason, "does not exist")))
       throw Error({.place = name_,
                    .problem = "the server refuses the user or the password (" + reason + ")",
                    .advice = "Write them in the URL, postgresql://user:password@host/name, or the "
                              "password in ~/.pgpass."});
-    if (reason.find("database") != std::string::npos &&
-        reason.find("does not exist") != std::string::npos)
+    if (contains(reason, "database") && contains(reason, "does not exist"))
       throw Error({.place = name_,
                    .problem = "the server has no such database (" + reason + ")",
                    .advice = "Create it once with createdb, or correct the end of the URL."});
-    throw ConnectionLost({.place = name_,
-                          .problem = "the server does not answer (" + reason + ")",
-                          .advice = "Check the host and the port of the URL and that the server "
-                                    "runs."});
+    if (state == PQPING_REJECT || contains(reason, "too many") ||
+        contains(reason, "connection slots"))
+      throw ConnectionLost(
+          {.place = name_,
+           .problem = "the server takes no connection at the moment (" + reason + ")"},
+          true);
+    if (!was_connected_) refuse_first(state, reason);
+    throw unreachable(reason);
+  }
+
+  /// What waiting does not help against: the URL has never been right.
+  void refuse_first(PGPing state, const std::string& reason) const {
+    if (contains(reason, "could not translate host name"))
+      throw Error({.place = name_,
+                   .problem = "there is no host of this name (" + reason + ")",
+                   .advice = "Correct the host in the URL."});
+    if (contains(reason, "invalid"))
+      throw Error({.place = name_,
+                   .problem = "this URL cannot be read (" + reason + ")",
+                   .expected = kUrlExample});
+    if (state == PQPING_OK)
+      throw Error({.place = name_,
+                   .problem = "the server refuses the connection (" + reason + ")",
+                   .advice = "Check user, password and database of the URL."});
+  }
+
+  [[nodiscard]] ConnectionLost unreachable(const std::string& reason) const {
+    return ConnectionLost({.place = name_,
+                           .problem = "the server does not answer (" + reason + ")",
+                           .advice = "Check the host and the port of the URL and that the server "
+                                     "runs."});
   }
 
   void check(const PGresult* result) const {
@@ -235,7 +294,8 @@ class PostgresqlDatabase final : public Database {
     // 08: connection, 57P: the server ends or starts, 40: the transaction is to be repeated.
     if (state.empty() || state.starts_with("08") || state.starts_with("57P") ||
         state.starts_with("40") || libpq().status(connection_.get()) != CONNECTION_OK)
-      throw ConnectionLost({.place = name_, .problem = "the connection was lost (" + reason + ")"});
+      throw ConnectionLost({.place = name_, .problem = "the connection was lost (" + reason + ")"},
+                           true);
     ErrorReport report{.place = name_, .problem = reason};
     if (state.starts_with("53")) {
       report.problem = "the server has no space or memory left (" + reason + ")";
@@ -283,6 +343,7 @@ class PostgresqlDatabase final : public Database {
 
   std::string name_;
   std::string url_;
+  bool was_connected_ = false;
   std::unique_ptr<PGconn, FinishConnection> connection_;
 };
 

@@ -58,6 +58,7 @@ class SqliteDatabase final : public Database {
     }
     refuse_network(address.target);
     open(address.target.c_str());
+    refuse_foreign();
     keep_log();
     // A crash of the program loses nothing; after a power cut the last trials may be done again.
     run("PRAGMA synchronous=NORMAL");
@@ -132,6 +133,14 @@ class SqliteDatabase final : public Database {
                            "--store postgresql://user@host/torsio."});
   }
 
+  /// A recording of another program may be a SQLite file, too: nothing is written into it.
+  void refuse_foreign() {
+    if (run("SELECT 1 FROM sqlite_master LIMIT 1").empty() || has_table("schema_version")) return;
+    throw Error({.place = name_,
+                 .problem = "this SQLite file is of another program",
+                 .advice = "Use --store FILE with another name."});
+  }
+
   /// Changes to the journal of a log. While another program does so too, SQLite fails at once
   /// instead of waiting.
   void keep_log() {
@@ -153,6 +162,8 @@ class SqliteDatabase final : public Database {
         sqlite3_open_v2(path, &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
     database_.reset(opened);
     if (code != SQLITE_OK) fail();
+    // Before anything is read: the files beside it would be those of this user, and lock out its owner.
+    if (sqlite3_db_readonly(opened, "main") == 1) fail(SQLITE_READONLY);
     sqlite3_busy_timeout(opened, 1000 * kBusyTimeout_s);
     sqlite3_extended_result_codes(opened, 1);
   }
@@ -211,9 +222,10 @@ class SqliteDatabase final : public Database {
     }
   }
 
-  [[noreturn]] void fail() const {
+  [[noreturn]] void fail() const { fail(sqlite3_errcode(database_.get()) & 0xff); }
+  [[noreturn]] void fail(int code) const {
     ErrorReport report{.place = name_, .problem = sqlite3_errmsg(database_.get())};
-    switch (sqlite3_errcode(database_.get()) & 0xff) {
+    switch (code) {
       case SQLITE_FULL:
         report.problem = "the disk is full: nothing of this step was written";
         report.advice = "Free some space and start the command again: it continues.";
@@ -238,7 +250,10 @@ class SqliteDatabase final : public Database {
       case SQLITE_IOERR:
         report.problem =
             fmt::format("reading or writing failed ({})", sqlite3_errmsg(database_.get()));
-        report.advice = "Check the disk and its free space.";
+        report.advice =
+            "Nothing of this step was written. Check the disk and its free space, and the quota "
+            "and "
+            "the limits of this user (ulimit -f); then start the command again: it continues.";
         break;
       default: break;
     }

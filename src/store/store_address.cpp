@@ -1,5 +1,6 @@
 #include "torsio/store/store_address.hpp"
 
+#include <algorithm>
 #include <cstddef>
 
 #include "torsio/core/error.hpp"
@@ -9,11 +10,17 @@ namespace torsio {
 std::string StoreAddress::name() const {
   if (kind == Kind::memory) return "store in memory";
   if (kind == Kind::sqlite) return target;
-  const std::size_t host = target.find("://") + 3;
-  const std::size_t at = target.find('@', host);
-  const std::size_t colon = target.find(':', host);
-  if (at == std::string::npos || colon > at) return target;
-  return target.substr(0, colon) + target.substr(at);
+  constexpr std::string_view kPassword = "password=";
+  std::string shown = target;
+  if (const std::size_t word = shown.find(kPassword, shown.find('?')); word != std::string::npos) {
+    const std::size_t begin = word + kPassword.size();
+    shown.erase(begin, std::min(shown.find('&', begin), shown.size()) - begin);
+  }
+  const std::size_t host = shown.find("://") + 3;
+  const std::size_t at = shown.find('@', host);
+  const std::size_t colon = shown.find(':', host);
+  if (at != std::string::npos && colon < at) shown.erase(colon, at - colon);
+  return shown;
 }
 
 StoreAddress store_address(std::string_view text) {

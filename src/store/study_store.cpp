@@ -3,33 +3,28 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <set>
-#include <thread>
 #include <utility>
 
 #include "store/database.hpp"
-#include "store/schema.hpp"
+#include "store/lost_trials.hpp"
+#include "store/row_values.hpp"
+#include "store/store_connection.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr std::int64_t kMaxLost = 3;  ///< a trial that lost its worker so often has failed
 /// Added to the number of a study: one decision about its halving steps at a time.
 constexpr std::int64_t kDecisionLock = 0x746f7273'00000000;
 
-std::int64_t number(TrialState state) noexcept { return static_cast<std::int64_t>(state); }
-
-std::int64_t whole(const DatabaseValue& value) { return std::get<std::int64_t>(value); }
 double real(const DatabaseValue& value) {
   if (const auto* const integer = std::get_if<std::int64_t>(&value))
     return static_cast<double>(*integer);
   const auto* const found = std::get_if<double>(&value);
   return found == nullptr ? kNotMeasured : *found;
 }
-const std::string& text(const DatabaseValue& value) { return std::get<std::string>(value); }
 std::string text_or_empty(const DatabaseValue& value) {
   const auto* const found = std::get_if<std::string>(&value);
   return found == nullptr ? std::string() : *found;
@@ -38,15 +33,6 @@ std::string text_or_empty(const DatabaseValue& value) {
 DatabaseValue finite_or_null(double value) {
   if (std::isfinite(value)) return value;
   return std::monostate{};
-}
-
-/// What happens to a trial that lost its worker.
-std::string loss() {
-  return fmt::format(
-      "lost = lost + 1, state = CASE WHEN lost + 1 >= {0} THEN {1} ELSE {2} END, "
-      "reason = CASE WHEN lost + 1 >= {0} THEN 'its worker was lost {0} times: it crashed, was "
-      "killed or had no memory left' ELSE '' END",
-      kMaxLost, number(TrialState::failed), number(TrialState::waiting));
 }
 
 constexpr std::string_view kStudyColumns = "id, name, kind, spec, torsio_version";
@@ -120,15 +106,7 @@ void insert_trials(Database& database, std::int64_t study, std::span<const Trial
 }
 
 void refuse_another(const StoredStudy& found, const StoredStudy& wanted, const std::string& place) {
-  if (found.torsio_version != wanted.torsio_version)
-    throw UsageError(
-        {.place = place,
-         .problem = fmt::format("study '{}' was begun by another version of torsio, whose fits may "
-                                "differ in the last digits",
-                                wanted.name),
-         .expected = found.torsio_version,
-         .found = wanted.torsio_version,
-         .advice = "Continue with the version that began it, or give --study another name."});
+  refuse_other_version(found, wanted.torsio_version, place);
   if (found.kind != wanted.kind || found.spec != wanted.spec)
     throw UsageError({.place = place,
                       .problem = fmt::format("study '{}' exists with other recordings, models or "
@@ -152,44 +130,27 @@ std::string_view name(TrialState state) noexcept {
   return "unknown";
 }
 
-StudyStore::StudyStore(const StoreAddress& address, OnWait on_wait)
-    : address_(address), on_wait_(std::move(on_wait)), database_(open_database(address)) {
-  prepare_schema(*database_, address_.name());
+void refuse_other_version(const StoredStudy& study, std::string_view version,
+                          const std::string& place) {
+  if (study.torsio_version == version) return;
+  throw Error(
+      {.place = place,
+       .problem = fmt::format("study '{}' was begun by another version of torsio, whose fits may "
+                              "differ in the last digits",
+                              study.name),
+       .expected = study.torsio_version,
+       .found = std::string(version),
+       .advice = "Use the version that began it, or begin a study with another name."});
 }
+
+StudyStore::StudyStore(const StoreAddress& address, OnWait on_wait, double patience_s)
+    : address_(address),
+      connection_(std::make_unique<StoreConnection>(address, std::move(on_wait), patience_s)) {}
 StudyStore::~StudyStore() = default;
 
-void StudyStore::wait_for_server(const std::string& reason) {
-  constexpr auto kAsk = std::chrono::milliseconds(250);
-  constexpr auto kLongest = std::chrono::milliseconds(10'000);
-  auto pause = std::chrono::milliseconds(100);
-  for (;;) {
-    for (auto waited = std::chrono::milliseconds(0); waited < pause; waited += kAsk) {
-      if (on_wait_ && !on_wait_(reason)) throw Cancelled();
-      std::this_thread::sleep_for(std::min(kAsk, pause));
-    }
-    try {
-      database_->reconnect();
-      if (on_wait_) on_wait_({});
-      return;
-    } catch (const ConnectionLost&) {
-      pause = std::min(2 * pause, kLongest);
-    }
-  }
-}
-
-/// Repeats `work`, a transaction that has no effect if it happened before, while the server is lost.
 template <class Work>
 auto StudyStore::with_connection(const Work& work) {
-  const std::scoped_lock lock(guard_);
-  for (;;) {
-    std::string reason;
-    try {
-      return work(*database_);
-    } catch (const ConnectionLost& lost) {
-      reason = lost.what();
-    }
-    wait_for_server(reason);
-  }
+  return connection_->run(work);
 }
 
 StoredStudy StudyStore::create_or_resume(const StoredStudy& study, std::span<const Trial> trials) {
@@ -225,32 +186,24 @@ std::vector<StoredStudy> StudyStore::studies() {
   });
 }
 
-void StudyStore::add_trials(std::int64_t study, std::span<const Trial> trials) {
-  with_connection([&](Database& database) {
-    Transaction transaction(database);
-    insert_trials(database, study, trials);
-    transaction.commit();
-  });
-}
-
-std::optional<Claim> StudyStore::claim(std::int64_t study, std::string_view worker,
-                                       double lease_s) {
+std::optional<Claim> StudyStore::claim(std::int64_t study, const std::string& worker,
+                                       double lease_s, bool runs_nothing) {
+  const auto claiming = [](const Database& database, std::string_view condition) {
+    return fmt::format(
+        "UPDATE trials SET state = {}, attempt = attempt + 1, worker = $2, lease_until = {} + $3 "
+        "WHERE id = (SELECT id FROM trials WHERE study = $1 AND state = {} AND {} ORDER BY "
+        "priority DESC, id LIMIT 1{}) RETURNING id, attempt, key, spec, family, device, step",
+        number(TrialState::running), database.now(), number(TrialState::waiting), condition,
+        database.skip_locked());
+  };
   return with_connection([&](Database& database) -> std::optional<Claim> {
     Transaction transaction(database);
-    // Without those that another worker is taking back: if it is stopped meanwhile, others do not wait.
-    database.run(
-        fmt::format("UPDATE trials SET {} WHERE id IN (SELECT id FROM trials WHERE "
-                    "study = $1 AND state = {} AND lease_until < {}{})",
-                    loss(), number(TrialState::running), database.now(), database.skip_locked()),
-        {study});
-    const auto rows = database.run(
-        fmt::format("UPDATE trials SET state = {}, attempt = attempt + 1, worker = $2, "
-                    "lease_until = {} + $3 WHERE id = (SELECT id FROM trials WHERE study = $1 AND "
-                    "state = {} ORDER BY priority DESC, id LIMIT 1{}) "
-                    "RETURNING id, attempt, key, spec, family, device, step",
-                    number(TrialState::running), database.now(), number(TrialState::waiting),
-                    database.skip_locked()),
-        {study, std::string(worker), lease_s});
+    // After an outage of the server or of the network others may not have extended theirs yet.
+    if (connection_->seconds_since_outage() > lease_s)
+      take_back_ended_leases(database, study, worker);
+    auto rows = database.run(claiming(database, kRunsWithOthers), {study, worker, lease_s});
+    const bool runs_alone = rows.empty() && runs_nothing;
+    if (runs_alone) rows = database.run(claiming(database, kRunsAlone), {study, worker, lease_s});
     transaction.commit();
     if (rows.empty()) return std::nullopt;
     const DatabaseRow& row = rows.front();
@@ -261,7 +214,8 @@ std::optional<Claim> StudyStore::claim(std::int64_t study, std::string_view work
                  .spec = text(row[3]),
                  .group = text(row[4]),
                  .device = text(row[5]),
-                 .step = static_cast<int>(whole(row[6]))};
+                 .step = static_cast<int>(whole(row[6])),
+                 .runs_alone = runs_alone};
   });
 }
 
@@ -313,22 +267,15 @@ void StudyStore::give_back(const Claim& claim) {
   });
 }
 
+void StudyStore::withdraw_loss(const Claim& claim) {
+  with_connection([&](Database& database) { torsio::withdraw_loss(database, claim.trial); });
+}
+
 std::vector<std::string> StudyStore::take_back(
     std::int64_t study, const std::function<bool(const std::string& worker)>& is_dead) {
   return with_connection([&](Database& database) {
-    std::vector<std::string> keys;
     Transaction transaction(database);
-    for (const DatabaseRow& row : database.run(
-             fmt::format("SELECT id, attempt, worker, key FROM trials WHERE study = $1 AND "
-                         "state = {} ORDER BY id",
-                         number(TrialState::running)),
-             {study})) {
-      if (!is_dead(text(row[2]))) continue;
-      database.run(fmt::format("UPDATE trials SET {} WHERE id = $1 AND attempt = $2 AND state = {}",
-                               loss(), number(TrialState::running)),
-                   {whole(row[0]), whole(row[1])});
-      keys.push_back(text(row[3]));
-    }
+    std::vector<std::string> keys = take_back_of(database, study, is_dead);
     transaction.commit();
     return keys;
   });
@@ -429,11 +376,6 @@ std::string StudyStore::samples(std::int64_t trial) {
     const auto rows = database.run("SELECT bytes FROM samples WHERE trial = $1", {trial});
     return rows.empty() ? std::string() : std::get<Blob>(rows.front().front()).bytes;
   });
-}
-
-std::unique_ptr<Database> open_database(const StoreAddress& address) {
-  return address.kind == StoreAddress::Kind::postgresql ? open_postgresql(address)
-                                                        : open_sqlite(address);
 }
 
 }  // namespace torsio

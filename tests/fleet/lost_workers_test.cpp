@@ -56,17 +56,19 @@ class LostWorkers : public testing::TestWithParam<std::string> {
   }
 
   /// A process that works until the study is complete. Its exit code: the results that were refused.
-  [[nodiscard]] pid_t start_worker(const std::function<double(const Claim&)>& run) const {
+  [[nodiscard]] pid_t start_worker(const std::function<double(const Claim&)>& run,
+                                   std::size_t threads = 1) const {
     const pid_t process = fork();
-    if (process == 0) _exit(static_cast<int>(work(run).lost));
+    if (process == 0) _exit(static_cast<int>(work(run, threads).lost));
     return process;
   }
 
-  [[nodiscard]] WorkersReport work(const std::function<double(const Claim&)>& run) const {
+  [[nodiscard]] WorkersReport work(const std::function<double(const Claim&)>& run,
+                                   std::size_t threads = 1) const {
     CalledStudy kind(run);
     StudyStore store(address_);
     const StoredStudy study = *store.find_study("elbow");
-    return run_workers(store, study, kind, {.threads = 1, .lease_s = kLease_s});
+    return run_workers(store, study, kind, {.threads = threads, .lease_s = kLease_s});
   }
 
   [[nodiscard]] std::vector<TrialRecord> trials() const {
@@ -108,6 +110,27 @@ TEST_P(LostWorkers, ATrialThatKillsThemHasFailedAfterThreeAndTheOthersAreDone) {
     EXPECT_EQ(record.state, TrialState::done) << record.trial.key;
     EXPECT_EQ(record.attempt, 1) << record.trial.key;
   }
+}
+
+TEST_P(LostWorkers, ATrialThatKillsThemAmongOthersIsFoundOutAndTheOthersAreDone) {
+  begin_study({"a", "b", "poison", "c", "d", "e"});
+  int killed = 0;
+  for (int status = SIGKILL; status != 0 && killed < 10; ++killed) {
+    const pid_t worker = start_worker(
+        [](const Claim& claim) {
+          if (claim.key == "poison") static_cast<void>(raise(SIGKILL));
+          std::this_thread::sleep_for(std::chrono::milliseconds(100));
+          return 1.0;
+        },
+        3);
+    ASSERT_EQ(waitpid(worker, &status, 0), worker);
+    if (status == 0) break;
+    ASSERT_TRUE(WIFSIGNALED(status)) << status;
+  }
+  EXPECT_LE(killed, 5);
+  for (const TrialRecord& record : trials())
+    EXPECT_EQ(record.state, record.trial.key == "poison" ? TrialState::failed : TrialState::done)
+        << record.trial.key;
 }
 
 TEST_P(LostWorkers, OneThatWasStoppedForLongerThanItsLeaseDropsItsResult) {

@@ -61,9 +61,13 @@ TEST_F(WorkRefuses, ARecordingThatHasChanged) {
   change("UPDATE trials SET state = 0; DELETE FROM results");
   ASSERT_EQ(torsio("simulate dfki-50 sweep --duration 20s --seed 4 -o r2.csv").exit_code, 0);
   const auto sentence = AllOf(HasSubstr("r2.csv"), HasSubstr("has changed"), Not(HasSubstr("r1.")));
-  const Outcome worker = torsio("work --store s.sqlite");
+  const Outcome worker = torsio("work --store s.sqlite --study elbow");
   EXPECT_EQ(worker.exit_code, kWorkFailed);
   EXPECT_THAT(worker.err, sentence);
+  // A worker of all studies leaves this one to others.
+  const Outcome any = torsio("work --store s.sqlite");
+  EXPECT_EQ(any.exit_code, 0);
+  EXPECT_THAT(any.err, sentence);
   const Outcome resumed = torsio(search);
   EXPECT_EQ(resumed.exit_code, kWorkFailed);
   EXPECT_THAT(resumed.err, sentence);

@@ -60,8 +60,9 @@ void fill(const StoreAddress& address, std::int64_t study, std::int64_t count) {
       "SELECT {0}, 'trial ' || n, '{{}}', 'specimens', 'joint ' || (n % {1}), 0, 1.0, 2, 1 FROM "
       "({2}) AS list;"
       "INSERT INTO results SELECT id, study, 1, (id * 7919 % 1000003) / 1000003.0, '{{\"rows\": "
-      "[]}}', 0.5, 0.0 FROM trials WHERE study = {0};"
-      "UPDATE studies SET trials = {3}, total_priority = {3} WHERE id = {0};{4}",
+      "[]}}', 0.5, 0.0 FROM trials WHERE study = {0} AND state = 2;"
+      "UPDATE studies SET trials = trials + {3}, total_priority = total_priority + {3} WHERE id = "
+      "{0};{4}",
       study, devices, numbers, count, is_postgresql ? "ANALYZE" : ""));
 }
 
@@ -85,11 +86,11 @@ void run(const std::string& place, std::int64_t count) {
   const StoredStudy small =
       store.create_or_resume({.name = "small", .kind = "test", .spec = "{}", .torsio_version = "1"},
                              numbered(2 * kClaims));
-  const StoredStudy large = store.create_or_resume(
-      {.name = "large", .kind = "test", .spec = "{}", .torsio_version = "1"}, {});
+  const StoredStudy large =
+      store.create_or_resume({.name = "large", .kind = "test", .spec = "{}", .torsio_version = "1"},
+                             numbered(2 * kClaims));
   const double per_trial = milliseconds_per_trial(store, small.id);
   fill(address, large.id, count);
-  store.add_trials(large.id, numbered(2 * kClaims));
   const auto page_after = [&](double value) {
     TrialRecord last;
     last.result.value = value;

@@ -10,6 +10,7 @@
 #include <map>
 #include <set>
 
+#include "fit/common/passes.hpp"
 #include "search/study_kinds.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
@@ -159,6 +160,14 @@ TEST(StructureSearch, AWrongSettingEndsIt) {
   std::vector<ModelChoice> choices = model_choices(dataset, "linear,viscoelastic", {});
   choices.back().options["network"] = "series(kv(k1=1";
   EXPECT_THROW((void)search_structures(dataset, choices, {}), UsageError);
+}
+
+TEST(StructureSearch, SearchesForALeakOnceForAllFoldsAndSteps) {
+  const Dataset dataset = three_recordings();
+  const auto choices = model_choices(dataset, kModels, {});
+  const std::size_t before = passes().leak_searches;
+  (void)search_structures(dataset, choices, {.halve_from_s = 0.0}, {}, 2);
+  EXPECT_EQ(passes().leak_searches - before, 1U);
 }
 
 TEST(StructureSearch, StopsWhenAsked) {

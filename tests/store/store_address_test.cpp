@@ -28,6 +28,9 @@ TEST(StoreAddress, ItsNameHasNoPassword) {
   EXPECT_EQ(store_address("postgresql://a:secret@b:5432/c").name(), "postgresql://a@b:5432/c");
   EXPECT_EQ(store_address("postgresql://a@b:5432/c").name(), "postgresql://a@b:5432/c");
   EXPECT_EQ(store_address("postgresql://b:5432/c").name(), "postgresql://b:5432/c");
+  EXPECT_EQ(store_address("postgresql://b/c?user=a&password=secret&sslmode=require").name(),
+            "postgresql://b/c?user=a&password=&sslmode=require");
+  EXPECT_EQ(store_address("postgresql://b/c?password=secret").name(), "postgresql://b/c?password=");
 }
 
 }  // namespace

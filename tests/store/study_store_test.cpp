@@ -4,14 +4,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <filesystem>
+#include <functional>
 #include <set>
 #include <thread>
 
 #include "support/error_message.hpp"
+#include "support/file_bytes.hpp"
 #include "support/postgresql_server.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
@@ -19,6 +25,7 @@
 namespace torsio {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -40,6 +47,12 @@ StoredStudy a_study() {
 
 /// The server that all tests of this program share, started by the first that needs it.
 test::PostgresqlServer& server() {
+  static test::PostgresqlServer shared;
+  return shared;
+}
+
+/// Another one, for tests that stop and start it; each leaves it running.
+test::PostgresqlServer& restarted_server() {
   static test::PostgresqlServer shared;
   return shared;
 }
@@ -121,16 +134,75 @@ TEST_P(EachStore, FinishingTwiceIsOneResult) {
 TEST_P(EachStore, ATrialThatLosesItsWorkerThreeTimesHasFailed) {
   StudyStore store(address_);
   const StoredStudy study = store.create_or_resume(a_study(), numbered_trials(2));
-  for (int k = 0; k < 3; ++k) {
-    const auto claim = store.claim(study.id, "worker", 0.01);
+  ASSERT_TRUE(store.claim(study.id, "lost 0", 0.01));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  // The other trial is done first.
+  const auto other = store.claim(study.id, "worker", 60.0);
+  EXPECT_EQ(other->key, "trial 0");
+  EXPECT_TRUE(store.finish(*other, {.value = 1.0}));
+  for (int k = 1; k < 3; ++k) {
+    EXPECT_FALSE(store.claim(study.id, "busy", 60.0, false)) << "it runs another trial";
+    const auto claim = store.claim(study.id, fmt::format("lost {}", k), 0.01);
     ASSERT_TRUE(claim);
     EXPECT_EQ(claim->key, "trial 1");
+    EXPECT_TRUE(claim->runs_alone);
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  EXPECT_EQ(store.claim(study.id, "worker", 60.0)->key, "trial 0");
+  EXPECT_FALSE(store.claim(study.id, "worker", 60.0));
   const TrialRecord lost = store.trials(study.id)[1];
   EXPECT_EQ(lost.state, TrialState::failed);
   EXPECT_THAT(lost.result.reason, HasSubstr("lost 3 times"));
+}
+
+TEST_P(EachStore, TrialsThatLoseTheirWorkerTogetherDoNotFail) {
+  StudyStore store(address_);
+  const StoredStudy study = store.create_or_resume(a_study(), numbered_trials(2));
+  constexpr int kLosses = 6;
+  for (int k = 0; k < kLosses; ++k) {
+    const std::string name = fmt::format("lost {}", k);
+    const auto first = store.claim(study.id, name, 0.01);
+    ASSERT_TRUE(first);
+    // After two losses they run alone: there is no loss together with another one any more.
+    EXPECT_EQ(first->runs_alone, k >= 2);
+    if (k >= 2) {
+      store.give_back(*first);
+      continue;
+    }
+    ASSERT_TRUE(store.claim(study.id, name, 60.0, false));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    // Both are taken back although the lease of one has not ended.
+    const auto again = store.claim(study.id, "other", 60.0);
+    ASSERT_TRUE(again);
+    store.give_back(*again);
+    EXPECT_EQ(store.counts(study.id).running, 0U);
+  }
+  EXPECT_EQ(store.counts(study.id).waiting, 2U);
+}
+
+TEST_P(EachStore, LossesOfWorkersThatRunDoNotCount) {
+  StudyStore store(address_);
+  const StoredStudy study = store.create_or_resume(a_study(), numbered_trials(1));
+  for (int k = 0; k < 5; ++k) {
+    const auto slow = store.claim(study.id, fmt::format("slow {}", k), 0.01);
+    ASSERT_TRUE(slow) << k;
+    EXPECT_FALSE(slow->runs_alone);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    const auto other = store.claim(study.id, "other", 60.0);
+    ASSERT_TRUE(other);
+    EXPECT_FALSE(store.extend(*slow, 60.0));
+    store.withdraw_loss(*slow);
+    store.give_back(*other);
+  }
+  EXPECT_EQ(store.counts(study.id).waiting, 1U);
+}
+
+TEST_P(EachStore, AWorkerDoesNotTakeBackItsOwnTrials) {
+  StudyStore store(address_);
+  const StoredStudy study = store.create_or_resume(a_study(), numbered_trials(1));
+  const auto claim = store.claim(study.id, "a machine that was suspended", 0.01);
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_FALSE(store.claim(study.id, "a machine that was suspended", 60.0));
+  EXPECT_TRUE(store.finish(*claim, {.value = 1.0}));
 }
 
 TEST_P(EachStore, GivingBackIsNoLoss) {
@@ -268,6 +340,84 @@ TEST(SqliteStore, RefusesWhatItCannotUse) {
   EXPECT_THAT(message_of(folder.file("text.sqlite", std::string(5000, 'x'))),
               HasSubstr("not a store of torsio"));
   EXPECT_THAT(message_of(folder.path(".")), HasSubstr("cannot be opened"));
+  { const StudyStore store(store_address(folder.path("whole.sqlite"))); }
+  const std::string whole = test::file_bytes(folder.path("whole.sqlite"));
+  const std::string part = folder.file("part.sqlite", whole.substr(0, whole.size() / 2));
+  EXPECT_THAT(message_of(part), HasSubstr("it is damaged"));
+}
+
+TEST(SqliteStore, WritesNothingIntoAFileOfAnotherProgram) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path("rosbag.db3");
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(database, "CREATE TABLE topics(id)", nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(database);
+  const std::string before = test::file_bytes(path);
+  EXPECT_THAT(test::error_message([&] { const StudyStore store(store_address(path)); }),
+              HasSubstr("of another program"));
+  EXPECT_EQ(test::file_bytes(path), before);
+  EXPECT_EQ(folder.files(), 1U);
+}
+
+/// Runs `work` in a process without the rights of root.
+int exit_code_of(const std::function<int()>& work) {
+  const pid_t process = fork();
+  if (process == 0) {
+    if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(99);
+    _exit(work());
+  }
+  int status = 0;
+  waitpid(process, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 98;
+}
+
+TEST(SqliteStore, OneThatMayNotBeWrittenIsLeftAsItIs) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path("studies.sqlite");
+  { const StudyStore store(store_address(path)); }
+  std::filesystem::permissions(path, std::filesystem::perms(0444));
+  std::filesystem::permissions(folder.path("."), std::filesystem::perms(0777));
+  const auto opens = [](const std::string& file, std::string_view sentence) {
+    const std::string message =
+        test::error_message([&] { const StudyStore store(store_address(file)); });
+    return message.find(sentence) == std::string::npos ? 1 : 0;
+  };
+  EXPECT_EQ(exit_code_of([&] { return opens(path, "the store may not be written"); }), 0);
+  EXPECT_EQ(folder.files(), 1U) << "files of another user lock out the owner";
+  std::filesystem::permissions(folder.path("."), std::filesystem::perms(0555));
+  EXPECT_EQ(
+      exit_code_of([&] { return opens(folder.path("new.sqlite"), "cannot be opened or created"); }),
+      0);
+  std::filesystem::permissions(folder.path("."), std::filesystem::perms(0755));
+}
+
+TEST(SqliteStore, WhereNothingCanBeWrittenNothingIsHalfWritten) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path("studies.sqlite");
+  StoredStudy study;
+  {
+    StudyStore store(store_address(path));
+    study = store.create_or_resume(a_study(), numbered_trials(1));
+  }
+  std::filesystem::permissions(path, std::filesystem::perms(0666));
+  std::filesystem::permissions(folder.path("."), std::filesystem::perms(0777));
+  const int code = exit_code_of([&] {
+    static_cast<void>(std::signal(SIGXFSZ, SIG_IGN));
+    const rlimit limit{400'000, 400'000};  // bytes of a file: as a quota
+    if (setrlimit(RLIMIT_FSIZE, &limit) != 0) return 2;
+    StudyStore store(store_address(path));
+    const auto claim = store.claim(study.id, "worker", 60.0);
+    const std::string message = test::error_message(
+        [&] { store.finish(*claim, {.value = 1.0, .samples = std::string(1'000'000, 'x')}); });
+    store.give_back(*claim);
+    return message.find("Nothing of this step was written") == std::string::npos ? 1 : 0;
+  });
+  EXPECT_EQ(code, 0);
+  StudyStore store(store_address(path));
+  EXPECT_EQ(store.counts(study.id).waiting, 1U);
+  EXPECT_THAT(store.best(study.id, 1), IsEmpty());
 }
 
 TEST(SqliteStore, RefusesANewerVersion) {
@@ -301,12 +451,23 @@ TEST_F(PostgresqlStore, WrongAddressesAreErrorsWithoutThePassword) {
   EXPECT_THAT(wrong, Not(HasSubstr("wrong-word")));
   EXPECT_THAT(message_of(server().url("secret", "absent")), HasSubstr("no such database"));
   EXPECT_THAT(message_of("postgresql://fleet@127.0.0.1:1/x"), HasSubstr("does not answer"));
+  EXPECT_THAT(message_of("postgresql://fleet@no-host.invalid/x"),
+              HasSubstr("no host of this name"));
+  const std::string unreadable = message_of("postgresql://fleet:secret@127.0.0.1:port/x");
+  EXPECT_THAT(unreadable, HasSubstr("this URL cannot be read"));
+  EXPECT_THAT(unreadable, Not(HasSubstr("secret")));
+  // Wrong from the first contact: waiting does not help.
+  EXPECT_THAT(test::error_message([&] {
+                const StudyStore store(store_address(server().url("wrong-word")), {}, 60.0);
+              }),
+              HasSubstr("refuses the user or the password"));
 }
 
 TEST_F(PostgresqlStore, WaitsForAServerThatRestarts) {
-  test::PostgresqlServer own;
+  test::PostgresqlServer& own = restarted_server();
+  const StoreAddress address = store_address(own.new_database());
   std::vector<std::string> reasons;
-  StudyStore store(store_address(own.url()), [&](const std::string& reason) {
+  StudyStore store(address, [&](const std::string& reason) {
     if (reasons.empty() || (reasons.back() != reason && (reason.empty() || reasons.back().empty())))
       reasons.push_back(reason);
     return true;
@@ -328,11 +489,89 @@ TEST_F(PostgresqlStore, WaitsForAServerThatRestarts) {
   EXPECT_EQ(reasons[1], "");
 }
 
+TEST_F(PostgresqlStore, LeasesThatEndedInAnOutageAreNotTakenBackAtOnce) {
+  test::PostgresqlServer& own = restarted_server();
+  const StoreAddress address = store_address(own.new_database());
+  StudyStore store(address, [](const std::string&) { return true; });
+  constexpr double kLease_s = 1.0;
+  const StoredStudy study = store.create_or_resume(a_study(), numbered_trials(1));
+  const auto claim = store.claim(study.id, "worker", kLease_s);
+  ASSERT_TRUE(claim);
+  own.stop("fast");
+  std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::duration<double>(1.5 * kLease_s));
+    own.start();
+  });
+  EXPECT_FALSE(store.claim(study.id, "other", kLease_s));
+  EXPECT_TRUE(store.extend(*claim, kLease_s));
+  // Had the worker been lost, its trial would be given to another one now.
+  std::this_thread::sleep_for(std::chrono::duration<double>(1.5 * kLease_s));
+  EXPECT_TRUE(store.claim(study.id, "other", kLease_s));
+}
+
+TEST_F(PostgresqlStore, AServerThatStartsIsWaitedFor) {
+  test::PostgresqlServer& own = restarted_server();
+  const StoreAddress address = store_address(own.new_database());
+  { const StudyStore store(address); }
+  own.stop("fast");
+  const auto opened = [&](double patience_s) {
+    const StudyStore store(
+        address, [](const std::string&) { return true; }, patience_s);
+  };
+  EXPECT_THAT(test::error_message([&] { opened(0.0); }), HasSubstr("does not answer"));
+  EXPECT_THAT(test::error_message([&] { opened(0.5); }), HasSubstr("does not answer"));
+  std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(700));
+    own.start();
+  });
+  EXPECT_NO_THROW(opened(60.0));
+  later.join();
+}
+
+TEST_F(PostgresqlStore, AServerThatRecoversIsWaitedForWithoutPatience) {
+  test::PostgresqlServer& own = restarted_server();
+  const StoreAddress address = store_address(own.new_database());
+  own.stop("fast");
+  own.start_in_recovery();
+  std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(700));
+    own.end_recovery();
+  });
+  std::set<std::string> reasons;
+  const StudyStore store(address, [&](const std::string& reason) {
+    reasons.insert(reason);
+    return true;
+  });
+  EXPECT_THAT(reasons, Contains(HasSubstr("takes no connection at the moment")));
+}
+
+TEST_F(PostgresqlStore, AServerWithoutAFreeConnectionIsWaitedFor) {
+  test::PostgresqlServer& own = restarted_server();
+  const StoreAddress address = store_address(own.new_database());
+  own.stop("fast");
+  constexpr std::size_t kConnections = 4;
+  own.start(fmt::format("-c max_connections={} -c max_wal_senders=0", kConnections));
+  std::vector<std::unique_ptr<StudyStore>> others;
+  for (std::size_t k = 0; k < kConnections; ++k)
+    others.push_back(std::make_unique<StudyStore>(address));
+  std::set<std::string> reasons;
+  const StudyStore store(address, [&](const std::string& reason) {
+    reasons.insert(reason);
+    others.clear();
+    return true;
+  });
+  EXPECT_THAT(reasons, Contains(HasSubstr("takes no connection at the moment")));
+  own.stop("immediate");
+  own.start();
+}
+
 TEST_F(PostgresqlStore, TheUserEndsTheWaiting) {
-  test::PostgresqlServer own;
-  StudyStore store(store_address(own.url()), [](const std::string&) { return false; });
+  test::PostgresqlServer& own = restarted_server();
+  const StoreAddress address = store_address(own.new_database());
+  StudyStore store(address, [](const std::string&) { return false; });
   own.stop("fast");
   EXPECT_THROW((void)store.studies(), Cancelled);
+  own.start();
 }
 
 }  // namespace

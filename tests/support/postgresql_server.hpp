@@ -60,12 +60,19 @@ class PostgresqlServer {
   PostgresqlServer(const PostgresqlServer&) = delete;
   PostgresqlServer& operator=(const PostgresqlServer&) = delete;
 
-  void start() {
+  /// @param options of the server: "-c max_connections=4"
+  void start(const std::string& options = {}) {
     command(
         fmt::format("{}/pg_ctl -D {}/data -l {}/log -w -o \"-p {} -k {} -c "
-                    "listen_addresses=127.0.0.1 -c fsync=off\" start",
-                    programs(), folder_, folder_, port_, folder_));
+                    "listen_addresses=127.0.0.1 -c fsync=off {}\" start",
+                    programs(), folder_, folder_, port_, folder_, options));
   }
+  /// Starts one that refuses connections, as a server does while it recovers, until `end_recovery`.
+  void start_in_recovery() {
+    command(fmt::format("touch {}/data/standby.signal", folder_));
+    start("-c hot_standby=off");
+  }
+  void end_recovery() { command(fmt::format("{}/pg_ctl -D {}/data promote", programs(), folder_)); }
   /// @param mode fast, or immediate: as after a crash
   void stop(const std::string& mode) {
     command(fmt::format("{}/pg_ctl -D {}/data -m {} stop", programs(), folder_, mode));

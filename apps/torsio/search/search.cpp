@@ -80,7 +80,13 @@ void check_call(const SearchFlags& flags) {
     throw torsio::UsageError({.place = "--store",
                               .problem = "a study that is kept needs a name",
                               .advice = "Give it with --study NAME."});
-  if (flags.engine != "slurm") return;
+  if (flags.engine != "slurm") {
+    if (flags.slurm.only_submits)
+      throw torsio::UsageError({.place = "--submit-only",
+                                .problem = "only a job of Slurm is submitted",
+                                .advice = "Add --engine slurm."});
+    return;
+  }
   if (flags.worker.study.empty() || flags.worker.store.empty())
     throw torsio::UsageError(
         {.place = "--engine slurm",
@@ -89,14 +95,15 @@ void check_call(const SearchFlags& flags) {
 }
 
 /// Runs the study here, or waits for the workers that run it.
-void complete(const SearchFlags& flags, torsio::StudyStore& store, const torsio::StoredStudy& study,
+/// @returns false if they are not waited for.
+bool complete(const SearchFlags& flags, torsio::StudyStore& store, const torsio::StoredStudy& study,
               torsio::StudyKind& kind, const torsio::Progress& progress) {
   try {
     if (flags.engine == "slurm") {
-      run_on_slurm(flags.slurm, flags.worker, store, study, kind, progress);
-    } else {
-      torsio::run_workers(store, study, kind, flags.worker.options(), progress);
+      return run_on_slurm(flags.slurm, flags.worker, store, study, kind, progress);
     }
+    torsio::run_workers(store, study, kind, flags.worker.options(), progress);
+    return true;
   } catch (const torsio::Cancelled&) {
     if (!flags.worker.study.empty())
       remark(fmt::format("study '{}' is kept in {}: the same command continues", study.name,
@@ -176,7 +183,7 @@ void run_specimens(SearchFlags& flags) {
                              kind.first_trials());
   take_back_of_dead(store, study);
   ProgressBar progress;
-  complete(flags, store, study, kind, progress.listener());
+  if (!complete(flags, store, study, kind, progress.listener())) return;
   flags.json.write(specimen_json(store, study.id));
   if (flags.json.wants_tables()) print(specimen_table(store, study.id));
 }
@@ -213,7 +220,7 @@ void run(SearchFlags& flags) {
                      flags.worker.study.empty()
                          ? ". Nothing is kept if it is stopped; --study NAME keeps it"
                          : fmt::format(", kept in {}", store.address().name())));
-  complete(flags, store, study, kind, progress.listener());
+  if (!complete(flags, store, study, kind, progress.listener())) return;
   const torsio::StructureSearch search = kind.result(store, study.id);
   flags.json.write(torsio::cross_validation_json(search.scores));
   if (flags.json.wants_tables()) print(cross_validation_text(search.scores));

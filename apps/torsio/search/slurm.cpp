@@ -17,6 +17,7 @@
 
 #include "common/output.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/search/workers.hpp"
 
 namespace {
 
@@ -137,29 +138,31 @@ void SlurmFlags::add(CLI::App& verb) {
   verb.add_option("--slurm-option", options,
                   "a line of the job's script: --slurm-option=--partition=long; may be repeated");
   verb.add_flag("--submit-only", only_submits,
-                "end after the job is submitted; the same command without --engine shows the table "
-                "later");
+                "end after the job of --engine slurm is submitted; the same command without these "
+                "two options shows the table later");
 }
 
-void run_on_slurm(const SlurmFlags& flags, const WorkerFlags& worker, torsio::StudyStore& store,
+bool run_on_slurm(const SlurmFlags& flags, const WorkerFlags& worker, torsio::StudyStore& store,
                   const torsio::StoredStudy& study, torsio::StudyKind& kind,
                   const torsio::Progress& progress) {
-  const auto decide = [&](const std::string& group, int step,
-                          std::span<const torsio::TrialRecord> trials) {
-    return kind.decide(group, step, trials);
-  };
-  if (store.counts(study.id).is_complete() && !store.advance(study.id, decide)) return;
+  if (store.counts(study.id).is_complete() && !torsio::advance(store, study, kind)) return true;
   const std::string path = study.name + ".sbatch";
   write_script(path, script_of(flags, worker, study));
   const std::string job = submit(path);
-  remark(
-      fmt::format("job {}: {} workers ({}); scancel {} stops them", job, flags.workers, path, job));
-  if (flags.only_submits) throw torsio::Cancelled();
+  const std::string submitted =
+      fmt::format("job {}: {} workers ({}); scancel {} stops them", job, flags.workers, path, job);
+  if (flags.only_submits) {
+    remark(submitted +
+           ". The same command without --engine slurm and --submit-only shows the table later; "
+           "trials that are left then are run by it.");
+    return false;
+  }
+  remark(submitted);
   constexpr int kPollsPerQuestion = 20;
   for (int poll = 0;; ++poll) {
-    if (!store.advance(study.id, decide)) {
+    if (!torsio::advance(store, study, kind)) {
       const torsio::StudyCounts counts = store.counts(study.id);
-      if (counts.is_complete()) return;
+      if (counts.is_complete()) return true;
       const double fraction = counts.finished_priority / std::max(counts.total_priority, 1e-12);
       if (progress &&
           !progress(fraction, fmt::format("{} of {} trials, {} running", counts.finished,

@@ -20,8 +20,9 @@ struct SlurmFlags {
 };
 
 /// Writes the job's script and submits it; then waits until every trial has finished, unless the
-/// user asked only to submit, which ends the program.
+/// user asked only to submit.
+/// @returns whether the study is complete.
 /// @throws torsio::Error if sbatch fails, or if no worker is left while trials are; Cancelled.
-void run_on_slurm(const SlurmFlags& flags, const WorkerFlags& worker, torsio::StudyStore& store,
-                  const torsio::StoredStudy& study, torsio::StudyKind& kind,
-                  const torsio::Progress& progress);
+[[nodiscard]] bool run_on_slurm(const SlurmFlags& flags, const WorkerFlags& worker,
+                                torsio::StudyStore& store, const torsio::StoredStudy& study,
+                                torsio::StudyKind& kind, const torsio::Progress& progress);

@@ -49,13 +49,14 @@ bool wait_for_server(const std::string& reason) {
 void take_back_of_dead(torsio::StudyStore& store, const torsio::StoredStudy& study) {
   if (store.address().kind != torsio::StoreAddress::Kind::sqlite) return;  // one machine
   const std::string own = torsio::worker_name();
-  const std::string host = own.substr(0, own.rfind(':') + 1);
+  const std::string host = own.substr(0, own.find(':') + 1);
   const auto keys = store.take_back(study.id, [&](const std::string& worker) {
     if (!worker.starts_with(host)) return false;
     pid_t process = 0;
     const char* const end = worker.data() + worker.size();
     const auto [at, code] = std::from_chars(worker.data() + host.size(), end, process);
-    return code == std::errc{} && at == end && kill(process, 0) != 0 && errno == ESRCH;
+    return code == std::errc{} && at != end && *at == ':' && kill(process, 0) != 0 &&
+           errno == ESRCH;
   });
   if (!keys.empty())
     remark(

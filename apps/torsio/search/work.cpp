@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cstdint>
+#include <limits>
+#include <map>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -21,38 +25,90 @@ struct WorkFlags {
   bool waits = false;
 };
 
-bool is_of_this_version(const torsio::StoredStudy& study, const torsio::StudyStore& store,
-                        bool is_named) {
-  if (study.torsio_version == torsio::kVersion) return true;
-  const torsio::ErrorReport report{
-      .place = store.address().name(),
-      .problem = fmt::format("study '{}' was begun by another version of torsio, and this one may "
-                             "give other last digits",
-                             study.name),
-      .expected = study.torsio_version,
-      .found = torsio::kVersion,
-      .advice = "Install that version on this machine."};
-  if (is_named) throw torsio::Error(report);
-  remark(torsio::Error(report).what());
-  return false;
-}
+/// The studies that cannot be run here: each is remarked on once, and tried again after a while, since
+/// a file that is missing may be copied later.
+class Skipped {
+ public:
+  [[nodiscard]] bool contains(const torsio::StoredStudy& study) const {
+    const auto found = studies_.find(study.id);
+    return found != studies_.end() && Clock::now() - found->second.since < kPause;
+  }
+  [[nodiscard]] bool is_empty() const noexcept { return studies_.empty(); }
+  void forget(const torsio::StoredStudy& study) { studies_.erase(study.id); }
 
-/// @returns whether any trial was run.
-bool work_on(const torsio::StoredStudy& study, torsio::StudyStore& store,
-             const torsio::WorkerOptions& options, const torsio::Progress& progress) {
-  take_back_of_dead(store, study);
-  if (store.counts(study.id).is_complete()) return false;
-  const auto kind = torsio::make_study_kind(study, progress);
-  const torsio::WorkersReport report = torsio::run_workers(store, study, *kind, options, progress);
-  if (report.finished + report.lost == 0) return false;
-  remark(fmt::format("study '{}': {} trials finished here{}", study.name, report.finished,
-                     report.lost > 0
-                         ? fmt::format(", {} lost to other workers, since this one did not answer "
-                                       "within the lease: their results were dropped",
-                                       report.lost)
-                         : ""));
-  return true;
-}
+  void add(const torsio::StoredStudy& study, const torsio::Error& error) {
+    Reason& known = studies_[study.id];
+    const std::string text = error.what();
+    if (known.text != text) remark(fmt::format("study '{}' is left out: {}", study.name, text));
+    known = {.text = text, .since = Clock::now()};
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Reason {
+    std::string text;
+    Clock::time_point since;
+  };
+  static constexpr auto kPause = std::chrono::seconds(60);
+  std::map<std::int64_t, Reason> studies_;
+};
+
+/// What `torsio work` runs trials with.
+struct Work {
+  const WorkFlags& flags;
+  torsio::StudyStore& store;
+  torsio::WorkerOptions options;
+  torsio::Progress progress;
+  Skipped skipped = {};
+
+  /// None: it cannot be run here, which is an error only for a study that was named.
+  std::unique_ptr<torsio::StudyKind> load(const torsio::StoredStudy& study) {
+    try {
+      torsio::refuse_other_version(study, torsio::kVersion, store.address().name());
+      auto kind = torsio::make_study_kind(study, progress);
+      skipped.forget(study);
+      return kind;
+    } catch (const torsio::Cancelled&) {
+      throw;
+    } catch (const torsio::Error& error) {
+      if (!flags.worker.study.empty()) throw;
+      skipped.add(study, error);
+      return nullptr;
+    }
+  }
+
+  /// @returns whether any trial was run.
+  bool work_on(const torsio::StoredStudy& study) {
+    if (skipped.contains(study)) return false;
+    take_back_of_dead(store, study);
+    if (store.counts(study.id).is_complete()) return false;
+    const auto kind = load(study);
+    if (!kind) return false;
+    const torsio::WorkersReport report =
+        torsio::run_workers(store, study, *kind, options, progress);
+    if (report.finished + report.lost == 0) return false;
+    remark(fmt::format(
+        "study '{}': {} trials finished here{}", study.name, report.finished,
+        report.lost > 0 ? fmt::format(", {} lost to other workers, since this one did not answer "
+                                      "within the lease: their results were dropped",
+                                      report.lost)
+                        : ""));
+    return true;
+  }
+
+  /// Those to work on. @throws torsio::Error if the one that was named does not exist.
+  [[nodiscard]] std::vector<torsio::StoredStudy> studies() {
+    std::vector<torsio::StoredStudy> all = store.studies();
+    const std::string& wanted = flags.worker.study;
+    if (wanted.empty()) return all;
+    std::erase_if(all, [&](const torsio::StoredStudy& study) { return study.name != wanted; });
+    if (all.empty() && !flags.waits)
+      throw torsio::Error({.place = store.address().name(),
+                           .problem = fmt::format("there is no study '{}'", wanted),
+                           .advice = "Begin it with torsio search, or wait for it with --wait."});
+    return all;
+  }
+};
 
 void run(const WorkFlags& flags) {
   if (flags.worker.store.empty())
@@ -60,23 +116,14 @@ void run(const WorkFlags& flags) {
         {.place = "--store", .expected = "a SQLite file or a postgresql:// URL", .found = "none"});
   torsio::WorkerOptions options = flags.worker.options();
   options.until_complete = false;
-  torsio::StudyStore store(torsio::store_address(flags.worker.store), wait_for_server);
+  torsio::StudyStore store(torsio::store_address(flags.worker.store), wait_for_server,
+                           flags.waits ? std::numeric_limits<double>::infinity()
+                                       : torsio::kWorkerPatience * options.lease_s);
   ProgressBar progress;
+  Work work{.flags = flags, .store = store, .options = options, .progress = progress.listener()};
   for (;;) {
-    std::vector<torsio::StoredStudy> studies = store.studies();
-    if (!flags.worker.study.empty()) {
-      std::erase_if(studies, [&](const torsio::StoredStudy& study) {
-        return study.name != flags.worker.study;
-      });
-      if (studies.empty() && !flags.waits)
-        throw torsio::Error({.place = store.address().name(),
-                             .problem = fmt::format("there is no study '{}'", flags.worker.study),
-                             .advice = "Begin it with torsio search, or wait for it with --wait."});
-    }
     bool has_worked = false;
-    for (const torsio::StoredStudy& study : studies)
-      if (is_of_this_version(study, store, !flags.worker.study.empty()))
-        has_worked |= work_on(study, store, options, progress.listener());
+    for (const torsio::StoredStudy& study : work.studies()) has_worked |= work.work_on(study);
     if (has_worked) continue;
     if (!flags.waits) break;
     for (int k = 0; k < 20; ++k) {
@@ -84,7 +131,8 @@ void run(const WorkFlags& flags) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
   }
-  remark("no trial is waiting");
+  remark(work.skipped.is_empty() ? "no trial is waiting"
+                                 : "no trial is waiting of the studies that can be run here");
 }
 
 }  // namespace

@@ -9,6 +9,9 @@
 
 namespace torsio {
 
+/// For how many leases a worker waits for a trial, or for a server that cannot be reached.
+inline constexpr double kWorkerPatience = 1.5;
+
 struct WorkerOptions {
   /// Trials that run at the same time; 0: one for each core that the process may use. When fewer
   /// trials are left, each may use more threads.
@@ -17,9 +20,9 @@ struct WorkerOptions {
   /// extensions.
   double lease_s = 60.0;
   /// Return only when every trial of the study has finished, also those of other workers; else when
-  /// none could be claimed for one and a half leases: those of a worker that was killed can be.
+  /// none could be claimed for `kWorkerPatience` leases: those of a worker that was killed can be.
   bool until_complete = true;
-  /// Which worker this is, in the store; empty: host and number of the process.
+  /// Which worker this is, in the store: a name that no other process has; empty: `worker_name`.
   std::string name = {};
   StudyStore::OnWait on_wait = {};  ///< for the connection that extends the leases
 };
@@ -36,7 +39,10 @@ struct WorkersReport {
 WorkersReport run_workers(StudyStore& store, const StoredStudy& study, StudyKind& kind,
                           const WorkerOptions& options, const Progress& progress = {});
 
-/// "host:1234"
+/// Enters the decisions of `kind` on halving steps that are complete. @returns whether there were any.
+bool advance(StudyStore& store, const StoredStudy& study, StudyKind& kind);
+
+/// "host:1234:9f3a1c2e": the number of the process, and one that no process before it had.
 [[nodiscard]] std::string worker_name();
 
 }  // namespace torsio

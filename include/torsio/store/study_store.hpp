@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,7 +16,7 @@
 
 namespace torsio {
 
-class Database;
+class StoreConnection;
 
 enum class TrialState : std::uint8_t { waiting, running, done, failed, pruned };
 [[nodiscard]] std::string_view name(TrialState state) noexcept;
@@ -52,6 +51,7 @@ struct Claim {
   std::string group;
   std::string device;
   int step = 0;
+  bool runs_alone = false;  ///< the worker is to run no other trial meanwhile
 };
 
 /// The result of a trial. Times are for information: they are not the same in every run.
@@ -99,6 +99,10 @@ struct HalvingDecision {
 /// or stopped for longer loses it, and its result is refused if it comes after all. So each trial has
 /// exactly one result.
 ///
+/// A trial that may be what its worker was lost of is claimed by workers that run nothing else; three
+/// losses there, and it has failed. Losses together with other trials of a worker, and of workers that
+/// turn out to run, make no trial fail.
+///
 /// All functions may be called by several threads. If a server is lost, they connect again and wait
 /// for it (`on_wait`), and repeat the transaction, which has no effect if it had happened.
 /// @throws Error as the database does: full disk, read only, no permission.
@@ -108,8 +112,10 @@ class StudyStore {
   /// each second (same reason): false ends the waiting with `Cancelled`.
   using OnWait = std::function<bool(const std::string& reason)>;
 
-  /// Opens or creates the store and its tables. @throws Error also for a store of a newer version.
-  explicit StudyStore(const StoreAddress& address, OnWait on_wait = {});
+  /// Opens or creates the store and its tables. A server that is starting is waited for.
+  /// @param patience_s for how long one is waited for that cannot be reached at first
+  /// @throws Error also for a wrong address or password, and for a store of a newer version.
+  explicit StudyStore(const StoreAddress& address, OnWait on_wait = {}, double patience_s = 0.0);
   ~StudyStore();
   StudyStore(const StudyStore&) = delete;
   StudyStore& operator=(const StudyStore&) = delete;
@@ -121,22 +127,24 @@ class StudyStore {
   StoredStudy create_or_resume(const StoredStudy& study, std::span<const Trial> trials);
   [[nodiscard]] std::optional<StoredStudy> find_study(std::string_view name);
   [[nodiscard]] std::vector<StoredStudy> studies();
-  /// Adds trials; those whose key and step are there already are left as they are.
-  void add_trials(std::int64_t study, std::span<const Trial> trials);
 
-  /// The waiting trial of the highest priority; none: all are done or run elsewhere. Leases that
-  /// ended are taken back first; a trial that was lost three times has failed.
-  [[nodiscard]] std::optional<Claim> claim(std::int64_t study, std::string_view worker,
-                                           double lease_s);
+  /// The waiting trial of the highest priority; none: all are done or run elsewhere. The trials of
+  /// other workers whose leases ended are taken back first.
+  /// @param worker a name that no other process has
+  /// @param runs_nothing whether this worker runs no trial at the moment
+  [[nodiscard]] std::optional<Claim> claim(std::int64_t study, const std::string& worker,
+                                           double lease_s, bool runs_nothing = true);
   /// Extends the lease. @returns false if another worker has the trial by now.
   bool extend(const Claim& claim, double lease_s);
   /// Writes the result. @returns false, and writes nothing, if the lease was lost.
   bool finish(const Claim& claim, const TrialResult& result);
   /// Gives the trial back, which counts as no loss: the user stopped the worker.
   void give_back(const Claim& claim);
+  /// Call once for a claim that was lost: the worker runs, so that the trial was not the cause.
+  void withdraw_loss(const Claim& claim);
 
-  /// Gives trials back before their leases end, where `is_dead` is certain that the worker of that
-  /// name does not run any more. It counts as a loss. @returns their keys.
+  /// Takes trials back before their leases end, where `is_dead` is certain that the worker of that
+  /// name does not run any more. It is a loss. @returns their keys.
   std::vector<std::string> take_back(std::int64_t study,
                                      const std::function<bool(const std::string& worker)>& is_dead);
 
@@ -160,12 +168,15 @@ class StudyStore {
  private:
   template <class Work>
   auto with_connection(const Work& work);
-  void wait_for_server(const std::string& reason);
 
   StoreAddress address_;
-  OnWait on_wait_;
-  std::mutex guard_;
-  std::unique_ptr<Database> database_;
+  std::unique_ptr<StoreConnection> connection_;
 };
+
+/// A study of another version is not continued.
+/// @param place of the store
+/// @throws Error that names both.
+void refuse_other_version(const StoredStudy& study, std::string_view version,
+                          const std::string& place);
 
 }  // namespace torsio
