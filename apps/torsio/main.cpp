@@ -86,6 +86,7 @@ int run(int argc, char** argv) {
   add_crossvalidate(app);
   add_search(app);
   add_work(app);
+  add_store(app);
   add_attribute(app);
   add_adapt(app);
   add_import(app);

@@ -17,6 +17,7 @@ void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_search(CLI::App& app);
 void add_work(CLI::App& app);
+void add_store(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);

@@ -251,6 +251,20 @@ std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes, const std::s
   return std::make_unique<MaybePacked>(std::make_unique<MemoryBytes>(bytes), name);
 }
 
+std::string sha256_hex(std::string_view bytes) {
+  Sha256 sha;
+  sha.add(bytes.data(), bytes.size());
+  return sha.hex();
+}
+
+std::string sha256_of_file(const std::string& path, const Progress& progress) {
+  const auto source = open_bytes(path, progress);
+  std::vector<char> block(kChunk);
+  while (source->read(block.data(), block.size()) > 0) {
+  }
+  return source->sha256();
+}
+
 bool read_exactly(ByteSource& source, std::string& to, std::size_t size) {
   constexpr std::size_t kBlock = std::size_t{1} << 20;
   to.clear();

@@ -30,6 +30,11 @@ inline constexpr std::string_view kZstdMark{"\x28\xb5\x2f\xfd", 4};
 [[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::string& path,
                                                      const Progress& progress = {});
 
+/// SHA-256 (hex) of bytes in memory.
+[[nodiscard]] std::string sha256_hex(std::string_view bytes);
+/// The SHA-256 that a recording of this file has. @throws Error if it cannot be read; Cancelled.
+[[nodiscard]] std::string sha256_of_file(const std::string& path, const Progress& progress = {});
+
 /// `size` bytes into `to`, or what is left; memory grows with what arrives, whatever the size.
 /// @returns whether there were so many
 [[nodiscard]] bool read_exactly(ByteSource& source, std::string& to, std::size_t size);

@@ -70,6 +70,10 @@ class Database {
   /// The types of a key that the database counts, and of bytes.
   [[nodiscard]] virtual std::string_view counted_key() const noexcept = 0;
   [[nodiscard]] virtual std::string_view bytes_type() const noexcept = 0;
+  /// Statements after which no row of the table can be removed, and none of these columns changed.
+  /// @param columns separated by commas; empty: all
+  [[nodiscard]] virtual std::string keep_rows(std::string_view table,
+                                              std::string_view columns = {}) const = 0;
 
  protected:
   Database() = default;

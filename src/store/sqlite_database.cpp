@@ -54,6 +54,7 @@ class SqliteDatabase final : public Database {
   explicit SqliteDatabase(const StoreAddress& address) : name_(address.name()) {
     if (address.kind == StoreAddress::Kind::memory) {
       open(":memory:");
+      run("PRAGMA foreign_keys=ON");
       return;
     }
     refuse_network(address.target);
@@ -62,6 +63,7 @@ class SqliteDatabase final : public Database {
     keep_log();
     // A crash of the program loses nothing; after a power cut the last trials may be done again.
     run("PRAGMA synchronous=NORMAL");
+    run("PRAGMA foreign_keys=ON");
   }
   ~SqliteDatabase() override { statements_.clear(); }
 
@@ -113,6 +115,17 @@ class SqliteDatabase final : public Database {
     return "INTEGER PRIMARY KEY AUTOINCREMENT";
   }
   std::string_view bytes_type() const noexcept override { return "BLOB"; }
+  std::string keep_rows(std::string_view table, std::string_view columns) const override {
+    // INSERT OR REPLACE removes a row without calling a trigger on DELETE.
+    return fmt::format(
+        "CREATE TRIGGER {0}_change BEFORE UPDATE{1}{2} ON {0} BEGIN {3} END;\n"
+        "CREATE TRIGGER {0}_removal BEFORE DELETE ON {0} BEGIN {3} END;\n"
+        "CREATE TRIGGER {0}_replacement BEFORE INSERT ON {0} WHEN EXISTS(SELECT 1 FROM {0} WHERE "
+        "{4} = NEW.{4}) BEGIN {3} END;\n",
+        table, columns.empty() ? "" : " OF ", columns,
+        fmt::format("SELECT RAISE(ABORT, 'rows of {} are kept as they are');", table),
+        columns.empty() ? "id" : columns);
+  }
 
  private:
   void refuse_network(const std::string& path) const {
