@@ -56,13 +56,6 @@ class Workers {
       : store_(store), study_(study), kind_(kind), options_(options) {
     threads_ = options.threads == 0 ? usual_threads() : options.threads;
     if (options_.name.empty()) options_.name = worker_name();
-    if (store.address().kind != StoreAddress::Kind::memory)
-      own_store_.emplace(
-          store.address(),
-          [this](const std::string& reason) {
-            return !stop_ && (!options_.on_wait || options_.on_wait(reason));
-          },
-          std::numeric_limits<double>::infinity());
   }
 
   WorkersReport run(const Progress& progress) {
@@ -71,7 +64,14 @@ class Workers {
     counts_ = at_start_;
     counted_ = start_;
     {
-      std::jthread extending([this] { guarded([this] { extend_leases(); }); });
+      std::jthread extending([this] {
+        guarded([this] {
+          try {
+            extend_leases();
+          } catch (const Cancelled&) {  // it was waiting for the server when all others had ended
+          }
+        });
+      });
       std::vector<std::jthread> threads;
       threads.reserve(threads_);
       active_ = threads_;
@@ -82,7 +82,7 @@ class Workers {
           --active_;
           changed_.notify_all();
         });
-      watch(progress);
+      guarded([&] { watch(progress); });
       threads.clear();  // waits for them
       const std::scoped_lock lock(guard_);
       stop_ = true;
@@ -100,6 +100,7 @@ class Workers {
     try {
       own_work();
     } catch (const Cancelled&) {
+      is_cancelled_ = true;
       stop_ = true;
     } catch (...) {
       const std::scoped_lock lock(guard_);
@@ -219,8 +220,14 @@ class Workers {
     share_ = std::max<std::size_t>(1, threads_ / std::max<std::size_t>(1, running_.size()));
   }
 
+  /// With a connection of its own, but for a store in memory: the other one may wait.
   void extend_leases() {
-    StudyStore& store = own_store_ ? *own_store_ : store_;
+    std::optional<StudyStore> own_store;
+    if (store_.address().kind != StoreAddress::Kind::memory)
+      own_store.emplace(
+          store_.address(), [this](const std::string& /*reason*/) { return !stop_; },
+          std::numeric_limits<double>::infinity());
+    StudyStore& store = own_store ? *own_store : store_;
     const auto pause = std::chrono::duration<double>(options_.lease_s / 3.0);
     while (true) {
       std::vector<Claim> claims;
@@ -284,7 +291,6 @@ class Workers {
   StudyKind& kind_;
   WorkerOptions options_;
   std::size_t threads_ = 1;
-  std::optional<StudyStore> own_store_;
 
   std::mutex claiming_;
   std::mutex guard_;
@@ -297,7 +303,7 @@ class Workers {
   std::atomic<std::size_t> share_ = 1;
   std::atomic<std::size_t> finished_ = 0;
   std::atomic<std::size_t> lost_ = 0;
-  bool is_cancelled_ = false;
+  std::atomic<bool> is_cancelled_ = false;
   Clock::time_point start_;
   Clock::time_point counted_;
   StudyCounts counts_;

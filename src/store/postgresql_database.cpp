@@ -275,6 +275,10 @@ class PostgresqlDatabase final : public Database {
       throw Error({.place = name_,
                    .problem = "there is no host of this name (" + reason + ")",
                    .advice = "Correct the host in the URL."});
+    if (contains(reason, "invalid response"))
+      throw Error({.place = name_,
+                   .problem = "there is another program at this address (" + reason + ")",
+                   .advice = "Correct the host or the port in the URL."});
     if (contains(reason, "invalid"))
       throw Error({.place = name_,
                    .problem = "this URL cannot be read (" + reason + ")",

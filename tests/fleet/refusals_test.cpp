@@ -73,6 +73,13 @@ TEST_F(WorkRefuses, ARecordingThatHasChanged) {
   EXPECT_THAT(resumed.err, sentence);
 }
 
+TEST_F(WorkRefuses, AStoreThatDoesNotExist) {
+  const Outcome outcome = torsio("work --store absent.sqlite");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed);
+  EXPECT_THAT(outcome.err, HasSubstr("absent.sqlite: there is no such store"));
+  EXPECT_EQ(shell("ls absent.sqlite").exit_code, 2) << "it was created";
+}
+
 TEST_F(WorkRefuses, AStudyThatDoesNotExist) {
   ASSERT_EQ(torsio(kSpecimens).exit_code, 0);
   const Outcome outcome = torsio("work --store s.sqlite --study absent");

@@ -105,7 +105,7 @@ TEST_F(StoppedSearch, KilledAgainAndAgainItHasTheTableOfOneThatWasNot) {
   EXPECT_TRUE(kill_after(9 * trials / 10, 1, kept));
   const Outcome last = torsio(kept + " --json kept.json");
   EXPECT_EQ(last.exit_code, 0) << last.err;
-  EXPECT_THAT(last.err, HasSubstr("are run again"));
+  EXPECT_THAT(last.err, HasSubstr("run again"));
   EXPECT_EQ(number("SELECT count(*) FROM trials WHERE state = 2"), trials);
   ASSERT_EQ(torsio(search + " --json whole.json").exit_code, 0);
   EXPECT_EQ(without_times(Json::parse(contents("kept.json"))),

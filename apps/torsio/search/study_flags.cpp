@@ -30,7 +30,7 @@ torsio::WorkerOptions WorkerFlags::options() const {
   constexpr double kLeast_s = 1.0;
   if (!(lease_s >= kLeast_s))
     throw torsio::UsageError({.place = "--lease", .expected = "at least 1s", .found = lease});
-  return {.threads = threads, .lease_s = lease_s, .on_wait = wait_for_server};
+  return {.threads = threads, .lease_s = lease_s};
 }
 
 bool wait_for_server(const std::string& reason) {
@@ -59,8 +59,9 @@ void take_back_of_dead(torsio::StudyStore& store, const torsio::StoredStudy& stu
            errno == ESRCH;
   });
   if (!keys.empty())
-    remark(
-        fmt::format("{} trials were running when the program that ran them was stopped, and are "
-                    "run again: {}",
-                    keys.size(), fmt::join(keys, "; ")));
+    remark(fmt::format("{} when the program that ran {} was killed, and {} run again: {}",
+                       keys.size() == 1 ? "a trial was running"
+                                        : fmt::format("{} trials were running", keys.size()),
+                       keys.size() == 1 ? "it" : "them", keys.size() == 1 ? "is" : "are",
+                       fmt::join(keys, "; ")));
 }

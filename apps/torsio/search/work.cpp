@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <memory>
@@ -116,7 +117,13 @@ void run(const WorkFlags& flags) {
         {.place = "--store", .expected = "a SQLite file or a postgresql:// URL", .found = "none"});
   torsio::WorkerOptions options = flags.worker.options();
   options.until_complete = false;
-  torsio::StudyStore store(torsio::store_address(flags.worker.store), wait_for_server,
+  const torsio::StoreAddress address = torsio::store_address(flags.worker.store);
+  if (address.kind == torsio::StoreAddress::Kind::sqlite && !flags.waits &&
+      !std::filesystem::exists(address.target))
+    throw torsio::Error({.place = address.name(),
+                         .problem = "there is no such store",
+                         .advice = "Correct the path, or begin a study with torsio search."});
+  torsio::StudyStore store(address, wait_for_server,
                            flags.waits ? std::numeric_limits<double>::infinity()
                                        : torsio::kWorkerPatience * options.lease_s);
   ProgressBar progress;

@@ -24,7 +24,6 @@ struct WorkerOptions {
   bool until_complete = true;
   /// Which worker this is, in the store: a name that no other process has; empty: `worker_name`.
   std::string name = {};
-  StudyStore::OnWait on_wait = {};  ///< for the connection that extends the leases
 };
 
 struct WorkersReport {
