@@ -1,7 +1,11 @@
 # The settings of all targets of this repository; users of the installed library inherit only C++20.
 add_library(torsio_build_settings INTERFACE)
 target_compile_options(torsio_build_settings INTERFACE
-  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -ffp-contract=off
+  -Wall -Wextra -Wpedantic -Wconversion
+  # In a unity build Clang also reports names that are the same as one of another source.
+  $<$<NOT:$<AND:$<CXX_COMPILER_ID:Clang>,$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>>:-Wshadow>
+  # Clang also reports where a float is only stored in a double.
+  $<$<NOT:$<CXX_COMPILER_ID:Clang>>:-Wdouble-promotion> -ffp-contract=off
   $<$<BOOL:${TORSIO_WARNINGS_AS_ERRORS}>:-Werror>)
 if(TORSIO_SANITIZE)
   target_compile_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE} -fno-omit-frame-pointer
@@ -67,9 +71,7 @@ function(torsio_unity_build target)
   endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
   # In a unit each source is an included file, whose anonymous namespace g++ takes for that of a header.
-  # Clang reports local names that are the same as a name of another source.
-  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>
-    $<$<CXX_COMPILER_ID:Clang>:-Wno-shadow>)
+  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endfunction()
 
 # torsio_library(<name>): the library torsio_<name>, known as torsio::<name>.

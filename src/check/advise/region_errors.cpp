@@ -287,7 +287,7 @@ std::vector<LearningPoint> RegionErrors::learning_curve() const {
     variance_of_mean += std::pow((errors_sum - samples * mean) / count, 2);
   const double effective = std::min(count, (square_sum / count - mean * mean) / variance_of_mean);
   std::vector<LearningPoint> curve;
-  for (const std::size_t parts : {8, 4, 2}) {
+  for (const std::size_t parts : {8U, 4U, 2U}) {
     if (all.blocks < parts * kFewTested) continue;
     const std::vector<double> each = errors_of_share(parts);
     double squares = 0.0;

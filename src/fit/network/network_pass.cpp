@@ -5,9 +5,12 @@
 #include "fit/network/layer_kernels.hpp"
 
 namespace torsio {
+namespace {
 
 using Kind = TrainingLayer::Kind;
 using float_gemm::multiply;
+
+}  // namespace
 
 void PackedNetwork::pack(const TrainingNetwork& network, const float* parameters) {
   layers_.resize(network.layers().size());

@@ -61,16 +61,16 @@ struct MissedPeak {
 
 void find_peak(const DriveLog& log, const DriveIdentification& identified, MissedPeak& worst) {
   const std::vector<double> angles = free_run(log, identified).angle_rad;
-  constexpr int kFrequencies = 40;
+  constexpr std::size_t kFrequencies = 40;
   std::array<double, kFrequencies> command{};
-  const auto phase = [&](int k) {
+  const auto phase = [&](std::size_t k) {
     const double frequency_Hz = 0.5 * std::pow(40.0, static_cast<double>(k) / (kFrequencies - 1));
     return 2.0 * std::numbers::pi * frequency_Hz * log.sample_period_s;
   };
-  for (int k = 0; k < kFrequencies; ++k) command[k] = amplitude(log.command, phase(k));
+  for (std::size_t k = 0; k < kFrequencies; ++k) command[k] = amplitude(log.command, phase(k));
   // A frequency that the command hardly has shows nothing.
   const double least = 0.3 * *std::ranges::max_element(command);
-  for (int k = 0; k < kFrequencies && phase(k) < 1.0; ++k) {
+  for (std::size_t k = 0; k < kFrequencies && phase(k) < 1.0; ++k) {
     if (command[k] < least || least <= 0.0) continue;
     const double measured = amplitude(log.angle_rad, phase(k)) / command[k];
     const double modelled = amplitude(angles, phase(k)) / command[k];
