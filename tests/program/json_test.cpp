@@ -22,6 +22,11 @@ constexpr const char* kTwoRecords =
 constexpr const char* kModel =
     "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.24m --seed 1 -o a.csv\n"
     "{torsio} fit a.csv --model linear -o m.safetensors\n";
+constexpr const char* kStored =
+    "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.24m --seed 1 -o a.csv\n"
+    "{torsio} fit a.csv --model linear --device-serial elbow -o m.safetensors\n"
+    "{torsio} store add elbow m.safetensors\n"
+    "{torsio} store promote elbow 1\n";
 constexpr const char* kNetwork =
     "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.24m --seed 1 -o a.csv\n"
     "{torsio} fit a.csv --model mlp --set epochs=2 -o m.safetensors\n";
@@ -53,6 +58,13 @@ const JsonCase kCases[] = {
     {"Simulate", "", "simulate dfki-50 sweep --duration 2s -o a.csv"},
     {"SimulateDescribe", "", "simulate --describe dfki-50"},
     {"SimulateList", "", "simulate --list"},
+    {"StoreAdd", kStored, "store add elbow m.safetensors"},
+    {"StoreExport", kStored, "store export elbow -o out.safetensors"},
+    {"StoreList", kStored, "store list"},
+    {"StorePromote", kStored, "store promote elbow 1"},
+    {"StoreShow", kStored, "store show elbow"},
+    {"StoreUpgrade", kStored, "store upgrade"},
+    {"StoreVerify", kStored, "store verify"},
     {"Track", "", "track --actuator dfki-50 --duration 5s"},
     {"TrackImpedance", "", "track --impedance zero --duration 10s"},
     {"TuneLoop", "", "tune-loop --actuator dfki-50"},

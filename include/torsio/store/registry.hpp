@@ -112,7 +112,7 @@ struct DeviceSummary {
   double current_since_s = kNotMeasured;
   std::optional<DriftEntry> last_drift = {};
   std::size_t models = 0;
-  std::size_t recordings = 0;  ///< those of the device or used by its models
+  std::size_t recordings = 0;  ///< recordings of the device or of its models
 };
 
 struct RegistryFinding {
