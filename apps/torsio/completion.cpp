@@ -202,14 +202,25 @@ std::string zsh_script(const CLI::App& app) {
     if (const auto names = part_names(*verb); !names.empty())
       parts += fmt::format("      {}) compadd -- {} ;;\n", verb->get_name(), fmt::join(names, " "));
   }
+  // --model=NAME is one word; what is before the value is set aside. A file of the search path of functions is run when
+  // its name is first completed, and completes this word as well.
   return fmt::format(
       "#compdef torsio\n_torsio() {{\n  local -a verbs=(\n{}  )\n"
-      "  if ((CURRENT == 2)); then\n    _describe verb verbs\n"
-      "  elif [[ $words[CURRENT] == -* ]]; then\n    case $words[2] in\n{}    esac\n"
-      "  else\n    if ((CURRENT == 3)); then\n      case $words[2] in\n{}      esac\n    fi\n"
-      "    case \"$words[2] $words[CURRENT-1] $((CURRENT - 2))\" in\n{}    esac\n"
-      "    _files\n  fi\n}}\ncompdef _torsio torsio\n",
-      verbs, cases, parts, zsh_values(app));
+      "  local before=$words[CURRENT-1] is_joined=\n"
+      "  if [[ $words[CURRENT] == --?*=* ]]; then\n"
+      "    before=${{words[CURRENT]%%=*}} is_joined=1\n    compset -P '*='\n  fi\n"
+      "  if ((CURRENT == 2)); then\n    if [[ $words[2] == -* ]]; then compadd -- {}\n"
+      "    else _describe verb verbs; fi\n"
+      "  elif [[ $words[CURRENT] == -* && ! $is_joined ]]; then\n    case $words[2] in\n{}    "
+      "esac\n"
+      "  else\n    if ((CURRENT == 3)) && [[ ! $is_joined ]]; then\n      case $words[2] in\n{}    "
+      "  esac\n    fi\n"
+      "    case \"$words[2] $before $((CURRENT - 2))\" in\n{}    esac\n"
+      "    _files\n  fi\n}}\n"
+      "if [[ $funcstack[1] == _torsio ]]; then\n  _torsio \"$@\"\nelse\n"
+      "  if ((! $+functions[compdef])); then autoload -Uz compinit && compinit -i; fi\n"
+      "  compdef _torsio torsio\nfi\n",
+      verbs, fmt::join(option_names(app), " "), cases, parts, zsh_values(app));
 }
 
 /// @param condition when the options apply, for example that a verb was typed
@@ -232,8 +243,9 @@ std::string fish_options(const CLI::App& verb, const std::string& condition,
 }
 
 std::string fish_script(const CLI::App& app) {
-  std::string script;
+  std::string script = "complete -c torsio -n __fish_use_subcommand -f\n";  // a verb, no file
   const std::vector<NamedValues> values = named_values(app);
+  script += fish_options(app, "__fish_use_subcommand", values);
   for (const CLI::App* verb : verbs_of(app)) {
     const std::string is_typed = "__fish_seen_subcommand_from " + verb->get_name();
     script += fmt::format("complete -c torsio -n __fish_use_subcommand -a {} -d {}\n",

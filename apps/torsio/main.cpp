@@ -54,7 +54,7 @@ void add_completion(CLI::App& app) {
   CLI::App* verb = app.add_subcommand("completion",
                                       "print a script that completes verbs and options in a shell");
   verb->footer(
-      "Example: source <(torsio completion bash)\n"
+      "Example: source <(torsio completion bash)      in ~/.bashrc, or zsh in ~/.zshrc\n"
       "         torsio completion fish > ~/.config/fish/completions/torsio.fish");
   auto shell = std::make_shared<std::string>();
   verb->add_option("SHELL", *shell, "bash, zsh or fish")->required();

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <regex>
 #include <string>
 
 #include "program.hpp"
@@ -154,55 +153,6 @@ TEST_F(FirstMinute, MachinesReadTheMachineAndTheTimes) {
   EXPECT_EQ(times.at("models").at(0).at("model"), "linear");
   EXPECT_GT(times.at("models").at(0).at("step_p999_ns"), 0.0);
   EXPECT_EQ(torsio("bench --loop-rate 2000").exit_code, kCallWasWrong) << "a rate has its unit";
-}
-
-TEST_F(FirstMinute, CompletionKnowsTheVerbsAndTheirOptions) {
-  const Outcome bash = shell("{torsio} completion bash > c && bash -n c && cat c");
-  EXPECT_EQ(bash.exit_code, 0) << bash.err;
-  const Outcome completed = shell(
-      "bash -c '. ./c; COMP_WORDS=(torsio compare --rep); COMP_CWORD=2; _torsio; echo "
-      "${COMPREPLY[@]}'");
-  EXPECT_EQ(completed.out, "--report\n") << completed.err;
-  const auto complete = [this](const std::string& words, int place) {
-    return shell("bash -c '. ./c; COMP_WORDS=(torsio " + words +
-                 "); COMP_CWORD=" + std::to_string(place) + "; _torsio; echo ${COMPREPLY[@]}'")
-        .out;
-  };
-  EXPECT_EQ(complete("simulate dfki-28", 2),
-            "dfki-28 dfki-28:maxwell-slip dfki-28:bouc-wen dfki-28:lugre\n");
-  EXPECT_EQ(complete("simulate dfki-50 static", 3), "static-cycle\n");
-  EXPECT_EQ(complete("fit a.csv --model grey", 4), "grey_box\n");
-  EXPECT_EQ(complete("compare a.csv --models maxw", 4), "maxwell_slip\n");
-  EXPECT_EQ(complete("track --actuator harmonic-drive:so", 3), "harmonic-drive:soft\n");
-  EXPECT_EQ(complete("reproduce 001-mod", 2), "001-models\n");
-  EXPECT_EQ(complete("design spr", 2), "spring\n");
-  EXPECT_EQ(complete("fit a.c", 2), "\n") << "the shell completes files";
-  // As bash divides it: at : and =.
-  EXPECT_EQ(complete("simulate dfki-28 :", 3), "maxwell-slip bouc-wen lugre\n");
-  EXPECT_EQ(complete("simulate dfki-28 : lu", 4), "lugre\n");
-  EXPECT_EQ(complete("simulate dfki-28 : lugre static", 5), "static-cycle\n");
-  EXPECT_EQ(complete("fit a.csv --model = grey", 5), "grey_box\n");
-  EXPECT_EQ(complete("fit a.csv --model =", 4), complete("fit a.csv --model \"\"", 4));
-  EXPECT_EQ(complete("simulate --describe dfki-28:lu", 3), "dfki-28:lugre\n");
-  EXPECT_EQ(complete("simulate -o static", 3), "\n") << "a file, not an experiment";
-  for (const char* shell_name : {"bash", "zsh", "fish"}) {
-    const Outcome script = torsio(std::string("completion ") + shell_name);
-    for (const char* word :
-         {"crossvalidate", "allow-leak", "report", "grey_box", "harmonic-drive:soft"})
-      EXPECT_NE(script.out.find(word), std::string::npos) << shell_name << " " << word;
-  }
-  EXPECT_EQ(torsio("completion tcsh").exit_code, kCallWasWrong);
-}
-
-TEST_F(FirstMinute, CompletionOffersValuesOnlyOfOptionsThatExist) {
-  const std::string script = torsio("completion bash").out;
-  const std::regex case_of_option("'([a-z]+) (--[a-z-]+) '\\*\\)");
-  std::size_t options = 0;
-  for (std::sregex_iterator at(script.begin(), script.end(), case_of_option), end; at != end;
-       ++at, ++options)
-    EXPECT_NE(torsio((*at)[1].str() + " --help").out.find((*at)[2].str()), std::string::npos)
-        << at->str();
-  EXPECT_GT(options, 8U);
 }
 
 }  // namespace
