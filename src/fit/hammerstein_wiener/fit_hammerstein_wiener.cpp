@@ -81,7 +81,7 @@ void check_length(const WienerData& own, const WienerShape& shape) {
 /// The best fit of a shape, or the reason why there is none.
 WienerFit fit_or_refuse(const WienerData& own, const WienerShape& shape, std::size_t iterations,
                         const Progress& progress) {
-  auto fit = fit_shape(own, shape, iterations, progress);
+  auto fit = fit_shape(own, shape, {.iterations = iterations}, progress);
   if (!fit)
     throw Error(
         {.place = "hammerstein_wiener",
@@ -202,6 +202,28 @@ double rmse_of(const WienerData& own, double sum_of_squares) {
   return std::sqrt(sum_of_squares / static_cast<double>(own.scored_samples()));
 }
 
+/// Structure and parameters.
+WienerFit searched_fit(const WienerData& own, const HammersteinWienerOptions& options,
+                       const Progress& progress, std::vector<std::string>& notes) {
+  check_length(own, {.zeros = options.zeros.value_or(0),
+                     .poles = options.poles.value_or(1),
+                     .input_values = 2,
+                     .output_values = 2});
+  WienerChoice choice = chosen_shape(own, options, progress);
+  notes.push_back(std::move(choice.note));
+  check_length(own, choice.shape);
+  check_continuous(options, choice.shape);
+  return std::move(choice.fit);
+}
+
+WienerFit given_fit(const WienerData& own, const HammersteinWienerOptions& options,
+                    const Progress& progress) {
+  const WienerShape shape = given_shape(options);
+  check_length(own, shape);
+  check_continuous(options, shape);
+  return fit_or_refuse(own, shape, options.iterations, progress);
+}
+
 ContinuousFit refine_or_refuse(const WienerData& own, const WienerNumbers& numbers,
                                std::size_t iterations, const Progress& progress) {
   ContinuousFit continuous = refined_in_continuous_time(own, numbers, iterations, progress);
@@ -239,23 +261,8 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
   if (data.input_count() > 1)
     fitted.notes.push_back(fmt::format("of the {} inputs only the first, {}, is used",
                                        data.input_count(), data.inputs.front().expression));
-  WienerShape shape = given_shape(options);
-  if (options.is_searched) {
-    check_length(own, {.zeros = options.zeros.value_or(0),
-                       .poles = options.poles.value_or(1),
-                       .input_values = 2,
-                       .output_values = 2});
-    WienerChoice choice = chosen_shape(own, options, context.progress);
-    shape = choice.shape;
-    fitted.notes.push_back(std::move(choice.note));
-  }
-  check_length(own, shape);
-  check_continuous(options, shape);
-  const Progress last = [&](double share, std::string_view doing) {
-    const double begin = options.is_searched ? 0.9 : 0.0;
-    return !context.progress || context.progress(begin + (1.0 - begin) * share, doing);
-  };
-  WienerFit fit = fit_or_refuse(own, shape, options.iterations, last);
+  WienerFit fit = options.is_searched ? searched_fit(own, options, context.progress, fitted.notes)
+                                      : given_fit(own, options, context.progress);
   const Summary summary(data, own);
   summary.table(fit.numbers, fitted);
   const double discrete_rmse = rmse_of(own, fit.sum_of_squares);
@@ -267,7 +274,8 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
         "its continuous form run by a first-order hold: training RMSE {:.4g}, discrete {:.4g}",
         rmse_of(own, WienerError(own, fit.numbers).sum_of_squares(fit.numbers)), discrete_rmse));
   } else if (options.continuous == ContinuousForm::refined) {
-    ContinuousFit continuous = refine_or_refuse(own, fit.numbers, options.iterations, last);
+    ContinuousFit continuous =
+        refine_or_refuse(own, fit.numbers, options.iterations, context.progress);
     std::vector<std::string> factors;
     factors.reserve(continuous.sections.size());
     for (const ContinuousTransfer& each : continuous.sections) factors.push_back(text_of(each));

@@ -7,16 +7,24 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
+#include "core/aligned_vector.hpp"
 #include "core/all_finite.hpp"
+#include "fit/hammerstein_wiener/section_kernel.hpp"
 #include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr std::size_t kBlock = 256;  // samples at once: their columns stay in the nearest caches
+/// Samples at once: their columns stay in the nearest caches.
+constexpr std::size_t kBlock = section_kernel::kColumnValues;
 using Eigen::Index;
-using Block = Eigen::MatrixXd;
+using Block = detail::AlignedVector<double>;  ///< column by column
+
+std::size_t rounded_up(std::size_t count) {
+  return (count + section_kernel::kLanes - 1) / section_kernel::kLanes * section_kernel::kLanes;
+}
 
 std::size_t largest_of(std::span<const double> values, std::size_t not_this) {
   std::size_t best = not_this == 0 ? 1 : 0;
@@ -25,32 +33,21 @@ std::size_t largest_of(std::span<const double> values, std::size_t not_this) {
   return best;
 }
 
-std::span<double> column(Block& block, std::size_t at, std::size_t samples) {
-  return {block.data() + at * kBlock, samples};
+std::span<double> column(std::span<double> block, std::size_t at, std::size_t samples) {
+  return block.subspan(at * kBlock, samples);
 }
 
-/// A signal, and where a block of it begins: its last two samples.
-struct Delayed {
-  std::array<double, 2> before{};
-
-  /// out(n) = signal(n - k), from block to block.
-  void shift(std::span<const double> signal, std::size_t k, std::span<double> out) const {
-    for (std::size_t n = 0; n < std::min(k, signal.size()); ++n) out[n] = before[2 - k + n];
-    if (signal.size() > k)
-      std::copy(signal.begin(), signal.end() - static_cast<std::ptrdiff_t>(k),
-                out.begin() + static_cast<std::ptrdiff_t>(k));
-  }
-  void keep(std::span<const double> signal) {
-    for (const double value : signal.last(std::min<std::size_t>(2, signal.size())))
-      before = {before[1], value};
-  }
-};
+constexpr std::array<double, 1> kImpulse{1.0};
 
 }  // namespace
 
 void fill_basis(const StaticCurve& curve, double x, std::span<double> basis) {
   if (!curve.knots.empty()) {
-    for (std::size_t i = 0; i < basis.size(); ++i) basis[i] = curve.basis(i, x);
+    std::ranges::fill(basis, 0.0);
+    for (const std::size_t i : {std::size_t{0}, std::size_t{1}}) {
+      const std::size_t at = curve.segment(x) + i;
+      basis[at] = curve.basis(at, x);
+    }
     return;
   }
   const double z = (x - curve.centre) / curve.half_range;
@@ -218,26 +215,81 @@ std::pair<std::size_t, std::size_t> WienerError::poles_at(std::size_t section) c
   return {at(section, 3), at(section, 4)};
 }
 
-/// The filters of one record.
-struct WienerError::Pass {
-  SectionCascade x;
-  std::vector<SectionCascade> input;      ///< one a free value of P
-  std::vector<SectionCascade> numerator;  ///< one a section
-  std::vector<SectionCascade> denominator;
-  std::vector<SectionCascade> start;
-  std::vector<Delayed> numerator_past;
-  std::vector<Delayed> denominator_past;
-  std::vector<Delayed> start_past;
+/// The sensitivities of one record, which all pass the same sections: those to the values of P, and for each
+/// section those to its numerator, to its denominator and to the state at the start.
+class WienerError::Sensitivities {
+ public:
+  Sensitivities(const Sections& g, std::size_t inputs, bool has_start)
+      : sections_(g),
+        inputs_(inputs),
+        per_section_(has_start ? 3 : 2),
+        stride_(rounded_up(inputs + per_section_ * g.rows)),
+        values_(kBlock * stride_),
+        coefficients_(3 * g.rows * stride_, 0.0),
+        states_(2 * g.rows * stride_, 0.0),
+        past_(stride_) {
+    for (std::size_t i = 0; i < g.rows; ++i)
+      for (std::size_t c = 0; c < 3; ++c) {
+        double* const b = coefficients_.data() + (3 * i + c) * stride_;
+        std::fill_n(b, numerator(i), g(i, c));  // what entered the cascade before this section
+        if (c == 0) std::fill_n(b + numerator(i), per_section_, 1.0);  // what enters here: 1 / F
+      }
+  }
 
-  Pass(const Sections& g, std::size_t inputs)
-      : x(g),
-        input(inputs, SectionCascade(g)),
-        numerator(g.rows, SectionCascade(g)),
-        denominator(numerator),
-        start(numerator),
-        numerator_past(g.rows),
-        denominator_past(g.rows),
-        start_past(g.rows) {}
+  [[nodiscard]] std::size_t numerator(std::size_t section) const {
+    return inputs_ + per_section_ * section;
+  }
+  [[nodiscard]] std::size_t denominator(std::size_t section) const {
+    return numerator(section) + 1;
+  }
+  [[nodiscard]] std::size_t start(std::size_t section) const { return numerator(section) + 2; }
+
+  /// Begins a block: all signals are zero.
+  void begin(std::size_t count) {
+    count_ = count;
+    std::fill_n(values_.data(), count * stride_, 0.0);
+  }
+  void set(std::size_t signal, std::span<const double> from, double factor = 1.0) {
+    double* to = values_.data() + signal;
+    for (const double value : from) {
+      *to = factor * value;
+      to += stride_;
+    }
+  }
+  void run_section(std::size_t i) {
+    double* const b = coefficients_.data() + 3 * i * stride_;
+    double* const s = states_.data() + 2 * i * stride_;
+    section_kernel::run({.b0 = b,
+                         .b1 = b + stride_,
+                         .b2 = b + 2 * stride_,
+                         .a1 = sections_(i, 3),
+                         .a2 = sections_(i, 4),
+                         .s1 = s,
+                         .s2 = s + stride_},
+                        values_.data(), count_, stride_);
+  }
+  /// out(n) = signal(n - k), from block to block.
+  void copy(std::size_t signal, std::size_t k, std::span<double> out) const {
+    for (std::size_t n = 0; n < std::min(k, count_); ++n) out[n] = past_[signal][2 - k + n];
+    const double* from = values_.data() + signal;
+    for (std::size_t n = k; n < count_; ++n, from += stride_) out[n] = *from;
+  }
+  /// Ends a block: keeps the last two values of each signal.
+  void end() {
+    for (std::size_t n = count_ - std::min<std::size_t>(2, count_); n < count_; ++n)
+      for (std::size_t k = 0; k < stride_; ++k) past_[k] = {past_[k][1], values_[n * stride_ + k]};
+  }
+
+ private:
+  const Sections& sections_;
+  std::size_t inputs_;
+  std::size_t per_section_;
+  std::size_t stride_;
+  std::size_t count_ = 0;
+  detail::AlignedVector<double> values_;        ///< [sample][signal] of a block
+  detail::AlignedVector<double> coefficients_;  ///< [section][b0, b1, b2][signal]
+  detail::AlignedVector<double> states_;        ///< [section][s1, s2][signal]
+  std::vector<std::array<double, 2>> past_;     ///< the last two values of each signal
 };
 
 /// Calls take(columns, samples) for each block of each record: one row per sample, zero where not
@@ -247,113 +299,109 @@ bool WienerError::pass(const WienerNumbers& numbers, bool with_slopes, const Tak
   const Sections& g = numbers.sections;
   const std::size_t error_at = with_slopes ? size() + 1 : 1;
   const std::size_t x_at = error_at - 1;
-  const std::size_t output_at = input_free_.size() + section_free_.size();
-  Block block = Block::Zero(kBlock, static_cast<Index>(error_at) + 1);
-  std::vector<double> work(kBlock);
-  std::vector<double> slope(kBlock);
-  std::vector<double> phi_of_x(output_free_);
+  const std::size_t inputs = with_slopes ? input_free_.size() : 0;
+  const bool has_start = numbers.start.rows > 0;
+  Block block(rounded_up(error_at + 1) * kBlock, 0.0);
+  const std::span<double> columns(block);
   for (std::size_t r = 0; r < data_.records.size(); ++r) {
     const WienerRecord& record = data_.records[r];
-    const bool has_start = numbers.start.rows > 0;
-    Pass of(g, with_slopes ? input_free_.size() : 0);
-    if (has_start) of.x.set_state(numbers.start.row(r));
+    SectionCascade cascade(g);
+    if (has_start) cascade.set_state(numbers.start.row(r));
+    Sensitivities sensitivities(g, inputs, has_start);
     for (std::size_t begin = 0; begin < record.input.size(); begin += kBlock) {
       const std::size_t count = std::min(kBlock, record.input.size() - begin);
-      const auto part = [&](std::size_t at) { return column(block, at, count); };
-      const auto w = std::span(work).first(count);
-      const auto x = part(x_at);
+      const auto x = column(columns, x_at, count);
       std::ranges::fill(x, 0.0);
       for (std::size_t k = 0; k < basis_[r].rows; ++k) {
         const auto phi = basis_[r].row(k).subspan(begin, count);
         const double value = numbers.input.values[k];
         for (std::size_t n = 0; n < count; ++n) x[n] += value * phi[n];
       }
-      // Through the cascade; on the way, what each section is given moves its numerator.
+      if (with_slopes) {
+        sensitivities.begin(count);
+        for (std::size_t k = 0; k < inputs; ++k)
+          sensitivities.set(k, basis_[r].row(input_free_[k]).subspan(begin, count));
+      }
       for (std::size_t i = 0; i < g.rows; ++i) {
-        if (with_slopes) {
-          std::ranges::copy(x, w.begin());
-          of.numerator[i].run_section(i, true, w);
-          of.numerator[i].run(w, i + 1);
-          for (std::size_t c = 0; c < 3; ++c)
-            if (const std::size_t to = at(i, c); to != kNowhere)
-              of.numerator_past[i].shift(w, c, part(to));
-          of.numerator_past[i].keep(w);
-        }
-        of.x.run_section(i, false, x);
-        if (with_slopes) {
-          std::ranges::transform(x, w.begin(), std::negate{});
-          of.denominator[i].run_section(i, true, w);
-          of.denominator[i].run(w, i + 1);
-          for (std::size_t c = 3; c < 5; ++c)
-            if (const std::size_t to = at(i, c); to != kNowhere)
-              of.denominator_past[i].shift(w, c - 2, part(to));
-          of.denominator_past[i].keep(w);
-        }
+        if (with_slopes) sensitivities.set(sensitivities.numerator(i), x);
+        cascade.run_section(i, false, x);
+        if (!with_slopes) continue;
+        sensitivities.set(sensitivities.denominator(i), x, -1.0);
+        if (has_start && begin == 0) sensitivities.set(sensitivities.start(i), kImpulse);
+        sensitivities.run_section(i);
       }
       if (with_slopes) {
-        for (std::size_t k = 0; k < input_free_.size(); ++k) {
-          std::ranges::copy(basis_[r].row(input_free_[k]).subspan(begin, count), part(k).begin());
-          of.input[k].run(part(k));
-        }
-        for (std::size_t c = model_size_; c < size(); ++c) std::ranges::fill(part(c), 0.0);
-        for (std::size_t i = 0; has_start && i < g.rows; ++i) {
-          std::ranges::fill(w, 0.0);
-          if (begin == 0) w[0] = 1.0;
-          of.start[i].run_section(i, true, w);
-          of.start[i].run(w, i + 1);
-          const std::size_t to = model_size_ + r * numbers.start.columns + 2 * i;
-          of.start_past[i].shift(w, 0, part(to));
-          of.start_past[i].shift(w, 1, part(to + 1));
-          of.start_past[i].keep(w);
-        }
-        for (std::size_t n = 0; n < count && output_free_ > 0; ++n) {
-          fill_basis(numbers.output, x[n], phi_of_x);
-          for (std::size_t k = 0; k < output_free_; ++k) part(output_at + k)[n] = phi_of_x[k];
-        }
-        for (std::size_t n = 0; n < count; ++n) slope[n] = numbers.output.slope(x[n]);
-        const Eigen::Map<const Eigen::ArrayXd> c(slope.data(), static_cast<Index>(count));
-        for (std::size_t k = 0; k < size(); ++k) {
-          if (k < output_at || k >= model_size_)
-            block.col(static_cast<Index>(k)).head(static_cast<Index>(count)).array() *= c;
-        }
+        fill_slopes(numbers, r, count, sensitivities, columns);
+        sensitivities.end();
       }
-      const auto error = part(error_at);
+      const auto error = column(columns, error_at, count);
       for (std::size_t n = 0; n < count; ++n) {
-        if (record.scored[begin + n] == 0) {
-          block.row(static_cast<Index>(n)).setZero();
-          continue;
-        }
+        if (record.scored[begin + n] == 0) continue;
         error[n] = numbers.output(x[n]) - record.target[begin + n];
         constexpr double kLargest = 1e100;
         if (!(std::abs(error[n]) < kLargest)) return false;
       }
+      for (std::size_t n = 0; n < kBlock; ++n)
+        if (n >= count || record.scored[begin + n] == 0)
+          for (std::size_t k = 0; k <= error_at; ++k) block[k * kBlock + n] = 0.0;
       take(block, begin, count, record);
     }
   }
   return true;
 }
 
+/// The columns of the numbers in a block of record `r`, whose x is in its column.
+void WienerError::fill_slopes(const WienerNumbers& numbers, std::size_t r, std::size_t count,
+                              const Sensitivities& of, std::span<double> block) const {
+  const auto part = [&](std::size_t at) { return column(block, at, count); };
+  const auto x = part(size());
+  for (std::size_t k = 0; k < input_free_.size(); ++k) of.copy(k, 0, part(k));
+  for (std::size_t i = 0; i < numbers.sections.rows; ++i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      if (const std::size_t to = at(i, c); to != kNowhere) of.copy(of.numerator(i), c, part(to));
+    for (std::size_t c = 3; c < 5; ++c)
+      if (const std::size_t to = at(i, c); to != kNowhere)
+        of.copy(of.denominator(i), c - 2, part(to));
+  }
+  for (std::size_t c = model_size_; c < size(); ++c) std::ranges::fill(part(c), 0.0);
+  for (std::size_t i = 0; numbers.start.rows > 0 && i < numbers.sections.rows; ++i) {
+    const std::size_t to = model_size_ + r * numbers.start.columns + 2 * i;
+    of.copy(of.start(i), 0, part(to));
+    of.copy(of.start(i), 1, part(to + 1));
+  }
+  const std::size_t output_at = input_free_.size() + section_free_.size();
+  std::vector<double> phi_of_x(output_free_);
+  Eigen::ArrayXd slope(static_cast<Index>(count));
+  for (std::size_t n = 0; n < count; ++n) {
+    if (output_free_ > 0) fill_basis(numbers.output, x[n], phi_of_x);
+    for (std::size_t k = 0; k < output_free_; ++k) part(output_at + k)[n] = phi_of_x[k];
+    slope[static_cast<Index>(n)] = numbers.output.slope(x[n]);
+  }
+  for (std::size_t k = 0; k < size(); ++k)
+    if (k < output_at || k >= model_size_)
+      Eigen::Map<Eigen::ArrayXd>(part(k).data(), static_cast<Index>(count)) *= slope;
+}
+
 double WienerError::sum_of_squares(const WienerNumbers& numbers) const {
   double sum = 0.0;
   const bool is_determined =
       pass(numbers, false, [&](const Block& block, auto, std::size_t count, auto&) {
-        sum += block.col(1).head(static_cast<Index>(count)).squaredNorm();
+        const auto error = std::span(block).subspan(kBlock, count);
+        sum += std::inner_product(error.begin(), error.end(), error.begin(), 0.0);
       });
   return is_determined ? sum : kNotMeasured;
 }
 
 bool WienerError::products(const WienerNumbers& numbers, Matrix& gram) const {
-  const auto columns = static_cast<Index>(size()) + 2;
-  Block sum = Block::Zero(columns, columns);
-  const bool is_determined =
-      pass(numbers, true, [&](const Block& block, auto, std::size_t count, auto&) {
-        const auto part = block.topRows(static_cast<Index>(count));
-        sum.selfadjointView<Eigen::Upper>().rankUpdate(part.transpose());
-      });
+  const std::size_t columns = rounded_up(size() + 2);
+  Matrix sum(columns, columns);
+  const bool is_determined = pass(numbers, true, [&](const Block& block, auto, auto, auto&) {
+    section_kernel::add_products(block.data(), columns, sum.values.data());
+  });
   gram = Matrix(size() + 1, size() + 1);
-  const auto source = [&](std::size_t k) { return static_cast<Index>(k < size() ? k : k + 1); };
+  const auto source = [&](std::size_t k) { return k < size() ? k : k + 1; };
   for (std::size_t i = 0; i < gram.rows; ++i)
-    for (std::size_t j = i; j < gram.rows; ++j) gram(i, j) = gram(j, i) = sum(source(i), source(j));
+    for (std::size_t j = 0; j <= i; ++j) gram(i, j) = gram(j, i) = sum(source(i), source(j));
   return is_determined && all_finite(gram.values);
 }
 
@@ -365,8 +413,7 @@ Matrix WienerError::rows(const WienerNumbers& numbers) const {
                for (std::size_t n = 0; n < count; ++n) {
                  if (of.scored[begin + n] == 0) continue;
                  for (std::size_t k = 0; k <= size(); ++k)
-                   all(row, k) =
-                       block(static_cast<Index>(n), static_cast<Index>(k < size() ? k : k + 1));
+                   all(row, k) = block[(k < size() ? k : k + 1) * kBlock + n];
                  ++row;
                }
              });
@@ -378,7 +425,7 @@ std::vector<double> WienerError::inner(const WienerNumbers& numbers) const {
   (void)pass(numbers, false,
              [&](const Block& block, std::size_t begin, std::size_t count, const WienerRecord& of) {
                for (std::size_t n = 0; n < count; ++n)
-                 if (of.scored[begin + n] != 0) all.push_back(block(static_cast<Index>(n), 0));
+                 if (of.scored[begin + n] != 0) all.push_back(block[n]);
              });
   return all;
 }

@@ -116,9 +116,11 @@ class WienerError {
   [[nodiscard]] std::vector<double> inner(const WienerNumbers& numbers) const;
 
  private:
-  struct Pass;
+  class Sensitivities;
   template <class Take>
   bool pass(const WienerNumbers& numbers, bool with_slopes, const Take& take) const;
+  void fill_slopes(const WienerNumbers& numbers, std::size_t r, std::size_t count,
+                   const Sensitivities& of, std::span<double> block) const;
 
   const WienerData& data_;
   WienerNumbers frame_;

@@ -3,14 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
+#include <optional>
 #include <utility>
 
-#include "core/report_progress.hpp"
 #include "fit/common/folds.hpp"
 #include "fit/hammerstein_wiener/wiener_problem.hpp"
+#include "numerics/parallel.hpp"
 #include "numerics/shared_progress.hpp"
 #include "torsio/core/error.hpp"
 
@@ -53,87 +56,158 @@ WienerData fold_of(WienerData data, std::size_t fold, bool is_held_out) {
   return data;
 }
 
-/// RMSE on the held-out blocks; infinite where a search does not end.
-double held_out_error(const WienerData& data, const WienerShape& shape, std::size_t iterations,
-                      const Progress& progress) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
-  const auto whole = fit_shape(data, shape, iterations, share_of(progress, 0.0, 0.5));
-  if (!whole || !whole->has_converged) return kNone;
-  double sum = 0.0;
-  std::size_t samples = 0;
-  for (std::size_t fold = 0; fold < kFolds; ++fold) {
-    report_progress(progress, 0.5 + 0.5 * static_cast<double>(fold) / kFolds, "held-out blocks");
+double rmse_of_sum(double sum_of_squares, std::size_t samples) {
+  return samples == 0 || !std::isfinite(sum_of_squares)
+             ? std::numeric_limits<double>::infinity()
+             : std::sqrt(sum_of_squares / static_cast<double>(samples));
+}
+
+/// RMSE on the held-out blocks, each search from the numbers that fit all blocks.
+double held_out_error(const WienerData& data, const WienerNumbers& numbers,
+                      const WienerLimits& limits, const Progress& progress) {
+  struct Fold {
+    double sum = 0.0;
+    std::size_t samples = 0;
+  };
+  std::array<Fold, kFolds> folds;
+  SharedProgress done(progress, 0.0, 1.0, kFolds, "held-out blocks");
+  for_each_chunk(kFolds, 0, [&](std::size_t fold) {
     const WienerData rest = fold_of(data, fold, false);
     const WienerData held_out = fold_of(data, fold, true);
-    if (rest.scored_samples() == 0 || held_out.scored_samples() == 0) continue;
-    const WienerFit fit = refined(rest, whole->numbers, iterations);
-    sum += held_sum_of_squares(held_out, fit.numbers);
-    samples += held_out.scored_samples();
+    if (rest.scored_samples() > 0 && held_out.scored_samples() > 0)
+      folds.at(fold) = {held_sum_of_squares(held_out, refined(rest, numbers, limits).numbers),
+                        held_out.scored_samples()};
+    done.tick();
+  });
+  double sum = 0.0;
+  std::size_t samples = 0;
+  for (const Fold& fold : folds) {
+    sum += fold.sum;
+    samples += fold.samples;
   }
-  return samples == 0 || !std::isfinite(sum) ? kNone
-                                             : std::sqrt(sum / static_cast<double>(samples));
+  return rmse_of_sum(sum, samples);
 }
 
 class ShapeSearch {
  public:
   ShapeSearch(const WienerData& data, std::size_t iterations, const Progress& progress)
-      : data_(data), iterations_(iterations), progress_(progress) {}
+      : data_(data),
+        limits_{.iterations = iterations, .tolerance = kCoarseTolerance},
+        progress_(progress) {}
 
   /// The smallest within 1 % of the best.
-  WienerShape best_of(std::vector<WienerShape> shapes, double begin, double end) {
+  ///
+  /// The error L_f on a held-out block f is at least that of the fit to all blocks: from L(all) <= L(rest) and
+  /// L_rest(rest) <= L_rest(all) follows L_f(rest) >= L_f(all). So a structure that is worse on all blocks than another
+  /// one on held-out ones need not be searched on these.
+  const WienerShape& best_of(std::vector<WienerShape> shapes, double begin, double end) {
     std::ranges::stable_sort(shapes, {}, numbers_of);
     shapes.erase(std::unique(shapes.begin(), shapes.end()), shapes.end());
-    std::vector<double> errors;
+    const double middle = 0.5 * (begin + end);
+    const Progress first_half = share_of(progress_, begin, middle);
+    ProgressOfParts parts(first_half, shapes.size());
+    candidates_.assign(shapes.size(), {});
+    for_each_chunk(shapes.size(), 0, [&](std::size_t i) {
+      candidates_[i] = fitted_to_all(shapes[i], with_name(parts.part(i), shapes[i]));
+    });
+    failed_ += static_cast<std::size_t>(std::ranges::count_if(
+        candidates_, [](const Candidate& candidate) { return !candidate.fit.has_value(); }));
+    tried_ += shapes.size();
+    std::vector<std::size_t> order(candidates_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return candidates_[i].fit_error; });
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const double length = (end - begin) / static_cast<double>(shapes.size());
-      const Progress report = share_of(progress_, begin + static_cast<double>(i) * length,
-                                       begin + static_cast<double>(i + 1) * length);
-      const Progress part = [&](double share, std::string_view doing) {
-        return !report || report(share, fmt::format("{}: {}", text_of(shapes[i]), doing));
-      };
-      errors.push_back(held_out_error(data_, shapes[i], iterations_, part));
-      least = std::min(least, errors.back());
-      if (!std::isfinite(errors.back())) ++failed_;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      Candidate& each = candidates_[order[k]];
+      if (!each.fit || each.fit_error > kGood * least) continue;
+      const double share = (end - middle) / static_cast<double>(order.size());
+      const double from = middle + static_cast<double>(k) * share;
+      each.held_out_error =
+          held_out_error(data_, each.fit->numbers, limits_,
+                         with_name(share_of(progress_, from, from + share), each.shape));
+      least = std::min(least, each.held_out_error);
+      if (!std::isfinite(each.held_out_error)) ++failed_;
     }
-    if (!std::isfinite(least))
+    return best().shape;
+  }
+
+  /// The best structure of the last comparison whose search ends to the fine tolerance, too.
+  WienerChoice choice(double begin, double end) {
+    while (true) {
+      Candidate& chosen = best();
+      WienerFit fit = refined(data_, chosen.fit->numbers, {.iterations = limits_.iterations},
+                              share_of(progress_, begin, end));
+      if (fit.has_converged) return {chosen.shape, std::move(fit), note(chosen)};
+      chosen.held_out_error = std::numeric_limits<double>::infinity();
+      ++failed_;
+    }
+  }
+
+ private:
+  static constexpr double kGood = 1.01;
+
+  struct Candidate {
+    WienerShape shape = {};
+    std::optional<WienerFit> fit = {};  ///< to all blocks; none: its search did not end
+    double fit_error = std::numeric_limits<double>::infinity();
+    double held_out_error = std::numeric_limits<double>::infinity();
+  };
+
+  [[nodiscard]] Candidate& best() {
+    const auto least = std::ranges::min_element(candidates_, {}, &Candidate::held_out_error);
+    if (least == candidates_.end() || !std::isfinite(least->held_out_error))
       throw Error(
           {.place = "hammerstein_wiener",
            .problem = "no structure's search converged",
            .advice = "Give zeros, poles and degrees (structure=given) to see why one fails."});
-    tried_ += shapes.size();
-    error_ = least;
-    constexpr double kGood = 1.01;
-    for (std::size_t i = 0;; ++i)
-      if (errors[i] <= kGood * least) return shapes[i];
+    const double limit = kGood * least->held_out_error;
+    return *std::ranges::find_if(
+        candidates_, [&](const Candidate& each) { return each.held_out_error <= limit; });
   }
 
-  [[nodiscard]] std::string note(const WienerShape& shape) const {
+  [[nodiscard]] std::string note(const Candidate& chosen) const {
     return fmt::format(
         "{}: the smallest of {} structures within 1 % of the least error on held-out blocks, "
         "{:.4g} in the target's unit{}",
-        text_of(shape), tried_, error_,
+        text_of(chosen.shape), tried_, chosen.held_out_error,
         failed_ == 0 ? "" : fmt::format("; {} did not converge and were passed over", failed_));
   }
 
- private:
+  [[nodiscard]] Candidate fitted_to_all(const WienerShape& shape, const Progress& progress) const {
+    Candidate candidate{.shape = shape, .fit = fit_shape(data_, shape, limits_, progress)};
+    if (candidate.fit && candidate.fit->has_converged)
+      candidate.fit_error = rmse_of_sum(candidate.fit->sum_of_squares, data_.scored_samples());
+    else
+      candidate.fit.reset();
+    return candidate;
+  }
+
+  static Progress with_name(Progress progress, const WienerShape& shape) {
+    if (!progress) return {};
+    return [progress = std::move(progress), text = text_of(shape)](double share,
+                                                                   std::string_view doing) {
+      return progress(share, fmt::format("{}: {}", text, doing));
+    };
+  }
+
   const WienerData& data_;
-  std::size_t iterations_;
+  WienerLimits limits_;
   const Progress& progress_;
   std::size_t tried_ = 0;
   std::size_t failed_ = 0;
-  double error_ = 0.0;
+  std::vector<Candidate> candidates_ = {};  ///< those compared last, the smallest first
 };
 
 }  // namespace
 
-WienerFit refined(const WienerData& data, const WienerNumbers& start, std::size_t iterations,
+WienerFit refined(const WienerData& data, const WienerNumbers& start, const WienerLimits& limits,
                   const Progress& progress) {
   const WienerError error(data, start);
   const std::vector<double> theta = stable_start(error, error.pack(start));
   const WienerChart chart = stable_chart(error);
   const ResidualProblem problem = wiener_problem(error, theta.size(), chart);
-  SearchOptions options{.max_iterations = iterations, .progress = progress};
+  SearchOptions options{
+      .max_iterations = limits.iterations, .tolerance = limits.tolerance, .progress = progress};
   SearchResult found = minimise_squares(problem, theta, options);
   const std::vector<double> bound = stable_bound(error);
   const auto is_beyond = [](double theta_i, double most) { return std::abs(theta_i) > most; };
@@ -151,7 +225,7 @@ WienerFit refined(const WienerData& data, const WienerNumbers& start, std::size_
 }
 
 std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& shape,
-                                   std::size_t iterations, const Progress& progress) {
+                                   const WienerLimits& limits, const Progress& progress) {
   const std::size_t sections = (std::max({shape.zeros, shape.poles, std::size_t{1}}) + 1) / 2;
   const bool has_start = 2 * sections * data.records.size() <= kMaxStarts;
   std::optional<WienerFit> best;
@@ -163,14 +237,14 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
     if (part.scored_samples() > 0) {
       std::vector<WienerFit> tried;
       tried.reserve(starts.size());
-      for (const WienerNumbers& start : starts) tried.push_back(refined(part, start, iterations));
+      for (const WienerNumbers& start : starts) tried.push_back(refined(part, start, limits));
       starts = {std::ranges::min_element(tried, {}, &WienerFit::sum_of_squares)->numbers};
     }
   }
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const auto begin = static_cast<double>(i) / static_cast<double>(starts.size());
     WienerFit fit =
-        refined(data, starts[i], iterations,
+        refined(data, starts[i], limits,
                 share_of(progress, begin, begin + 1.0 / static_cast<double>(starts.size())));
     // A search that ended goes before one that did not, whatever its error.
     if (!best || std::pair(!fit.has_converged, fit.sum_of_squares) <
@@ -245,15 +319,15 @@ WienerChoice chosen_shape(const WienerData& data, const HammersteinWienerOptions
   for (const auto& [zeros, poles] :
        {std::pair{0U, 1U}, {1U, 1U}, {1U, 2U}, {2U, 2U}, {2U, 3U}, {3U, 3U}, {3U, 4U}, {4U, 4U}})
     shapes.push_back(shape_of(options, zeros, poles, 1, 3));
-  WienerShape best = search.best_of(shapes, 0.0, 0.5);
+  const WienerShape best = search.best_of(shapes, 0.0, 0.5);
   shapes.clear();
   for (const std::size_t input : {1U, 2U, 3U})
     for (const std::size_t output : {1U, 2U, 3U, 5U})
       shapes.push_back(shape_of(options, best.zeros, best.poles, input, output));
   // What was given stays given: only the other order is the search's.
   for (WienerShape& shape : shapes) shape.zeros = best.zeros, shape.poles = best.poles;
-  best = search.best_of(shapes, 0.5, 0.9);
-  return {best, search.note(best)};
+  (void)search.best_of(shapes, 0.5, 0.9);
+  return search.choice(0.9, 1.0);
 }
 
 }  // namespace torsio

@@ -19,13 +19,24 @@ struct WienerFit {
   std::size_t iterations = 0;
 };
 
+/// Relative fall of the sum of squares of one step below which a search has converged.
+inline constexpr double kFineTolerance = 1e-9;
+/// The same while structures are compared, of which those within 1 % are equally good.
+inline constexpr double kCoarseTolerance = 1e-5;
+
+/// How far a search goes.
+struct WienerLimits {
+  std::size_t iterations = 200;
+  double tolerance = kFineTolerance;
+};
+
 /// From these numbers to the least simulation error.
 [[nodiscard]] WienerFit refined(const WienerData& data, const WienerNumbers& start,
-                                std::size_t iterations, const Progress& progress = {});
+                                const WienerLimits& limits, const Progress& progress = {});
 
 /// The best of all starts of a shape; nothing if none can be run.
 [[nodiscard]] std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& shape,
-                                                 std::size_t iterations,
+                                                 const WienerLimits& limits,
                                                  const Progress& progress = {});
 
 /// As a model: x held where C is monotone, within the trained range widened by itself on both sides.
@@ -38,6 +49,7 @@ struct WienerFit {
 
 struct WienerChoice {
   WienerShape shape;
+  WienerFit fit;
   std::string note;
 };
 /// Orders first, then degrees, by the error on held-out blocks.

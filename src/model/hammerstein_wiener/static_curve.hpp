@@ -47,9 +47,10 @@ struct StaticCurve {
   [[nodiscard]] double slope(double x) const noexcept;
   /// The factor of v_i: z^i, or the hat over knot i.
   [[nodiscard]] double basis(std::size_t i, double x) const noexcept;
+  /// The knot that begins the segment of x; there are knots.
+  [[nodiscard]] std::size_t segment(double x) const noexcept;
 
  private:
-  [[nodiscard]] std::size_t segment(double x) const noexcept;
   [[nodiscard]] double segment_value(double x) const noexcept;
 };
 
