@@ -85,6 +85,7 @@ int run(int argc, char** argv) {
   add_compare(app);
   add_crossvalidate(app);
   add_search(app);
+  add_fleet(app);
   add_work(app);
   add_store(app);
   add_attribute(app);

@@ -16,6 +16,7 @@ void add_estimate(CLI::App& app);
 void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_search(CLI::App& app);
+void add_fleet(CLI::App& app);
 void add_work(CLI::App& app);
 void add_store(CLI::App& app);
 void add_convert(CLI::App& app);

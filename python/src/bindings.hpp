@@ -87,6 +87,7 @@ auto interruptible(const Work& work) {
 
 void bind_errors(py::module_& module);
 void bind_progress(py::module_& module);
+void bind_fleet(py::module_& module);
 void bind_impedance(py::module_& module);
 void bind_supervision(py::module_& module);
 void bind_imports(py::module_& module);

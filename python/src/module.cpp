@@ -72,6 +72,7 @@ PYBIND11_MODULE(_core, module) {
   bind_learning(module);
   bind_control(module);
   bind_impedance(module);
+  bind_fleet(module);
   bind_supervision(module);
   bind_imports(module);
   bind_drives(module);

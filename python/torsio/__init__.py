@@ -41,6 +41,7 @@ from ._tables import recording_from_dict, recording_from_pandas, recording_to_pa
 if TYPE_CHECKING:
     from . import link, plot
     from ._drives import DriveParameter, IdentifiedDrive, identify, read_drive
+    from ._fleet import Fleet, Registry, Study, calibrate_fleet, watch_fleet
     from ._learning import attribute, check, compare, crossvalidate, drift, evaluate, fit, import_network, transfer
     from ._loops import ImpedanceTracking, Tracking, margins, track, track_impedance
     from ._progress import progress
@@ -95,6 +96,7 @@ __all__ = [
     "Estimator",
     "Fault",
     "Finding",
+    "Fleet",
     "FoldSummary",
     "IdentifiedDrive",
     "ImpedanceTracking",
@@ -104,12 +106,15 @@ __all__ = [
     "MonitorReport",
     "MonitorSource",
     "Recording",
+    "Registry",
     "Results",
     "Score",
+    "Study",
     "Tracking",
     "UsageError",
     "adapt",
     "attribute",
+    "calibrate_fleet",
     "calibrate_monitor",
     "calibrate_simulated_monitor",
     "check",
@@ -137,12 +142,14 @@ __all__ = [
     "track",
     "track_impedance",
     "transfer",
+    "watch_fleet",
 ]
 
 
 # Imported when they are first used: a loop that only loads a model starts sooner.
 _LATER = {
     "_drives": "DriveParameter IdentifiedDrive identify read_drive",
+    "_fleet": "Fleet Registry Study calibrate_fleet watch_fleet",
     "_learning": "attribute check compare crossvalidate drift evaluate fit import_network transfer",
     "_loops": "ImpedanceTracking Tracking margins track track_impedance",
     "_progress": "progress",

@@ -4,10 +4,9 @@
 #include <numbers>
 
 namespace torsio {
-namespace {
 
-/// P(|T| < t), Abramowitz and Stegun 26.7.3 and 26.7.4, exact for whole degrees of freedom.
-double probability_within(double t, std::size_t degrees_of_freedom) {
+// Abramowitz and Stegun 26.7.3 and 26.7.4, exact for whole degrees of freedom.
+double student_t_within(double t, std::size_t degrees_of_freedom) {
   const auto nu = static_cast<double>(degrees_of_freedom);
   const double angle = std::atan(t / std::sqrt(nu));
   const double square = std::cos(angle) * std::cos(angle);
@@ -22,17 +21,15 @@ double probability_within(double t, std::size_t degrees_of_freedom) {
   return 2.0 / std::numbers::pi * (angle + std::sin(angle) * sum);
 }
 
-}  // namespace
-
 double student_t(double probability, std::size_t degrees_of_freedom) {
   double low = 0.0;
   double high = 1.0;
   constexpr double kHuge = 1e12;
-  while (high < kHuge && probability_within(high, degrees_of_freedom) < probability) high *= 2.0;
+  while (high < kHuge && student_t_within(high, degrees_of_freedom) < probability) high *= 2.0;
   constexpr int kHalvings = 80;
   for (int k = 0; k < kHalvings; ++k) {
     const double middle = 0.5 * (low + high);
-    (probability_within(middle, degrees_of_freedom) < probability ? low : high) = middle;
+    (student_t_within(middle, degrees_of_freedom) < probability ? low : high) = middle;
   }
   return 0.5 * (low + high);
 }

@@ -11,7 +11,7 @@
 #include <set>
 
 #include "fit/common/passes.hpp"
-#include "search/study_kinds.hpp"
+#include "fleet/study_kinds.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"

@@ -44,6 +44,15 @@ enum class DriftAdvice : std::uint8_t {
 };
 [[nodiscard]] std::string_view name(DriftAdvice advice) noexcept;
 
+/// What no change explains at one compared sample.
+struct DriftResidual {
+  std::size_t record = 0;  ///< in the dataset
+  std::size_t sample = 0;
+  double value = 0.0;      ///< target's unit
+  double elastic = 0.0;    ///< the elastic torque E there
+  double stiffness = 0.0;  ///< dE/dx
+};
+
 /// What has changed since the calibration of a model (docs/robot/drift.md).
 struct Drift {
   std::vector<DriftQuantity> quantities = {};
@@ -56,6 +65,7 @@ struct Drift {
   double corrected_rmse = kNotMeasured;     ///< with all changes above corrected
   DriftVerdict joint = DriftVerdict::undetermined;  ///< all quantities of the joint together
   DriftAdvice advice = DriftAdvice::none;
+  std::vector<DriftResidual> residual = {};  ///< only if `DriftOptions::with_residual`
 };
 
 struct DriftOptions {
@@ -65,6 +75,7 @@ struct DriftOptions {
   /// gain of the torque sensor from the stiffness, and with the current it shows the friction of the drive.
   /// Null: gain and stiffness are one quantity.
   const ModelFile* reference = nullptr;
+  bool with_residual = false;
 };
 
 /// Compares the torque of recordings (role test) with a model of it: generalised least squares of

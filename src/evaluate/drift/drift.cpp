@@ -64,8 +64,10 @@ class Comparison {
       : model_(model), options_(options) {
     TrainingData data = training_data(dataset, model.settings.features, Role::test);
     auto sequence = data.sequences.begin();
-    for (const DatasetRecord& record : dataset.records) {
+    for (std::size_t index = 0; index < dataset.records.size(); ++index) {
+      const DatasetRecord& record = dataset.records[index];
       if (!record.has_role(Role::test)) continue;
+      records_.push_back(index);
       report_progress(
           progress, static_cast<double>(runs_.size()) / static_cast<double>(dataset.records.size()),
           "comparing");
@@ -97,6 +99,7 @@ class Comparison {
     drift.quantities = {zero(fit, model_error), scale(fit, model_error), friction(fit, model_error),
                         backlash(fit, model_error)};
     conclude(drift);
+    if (options_.with_residual) list_residual(fit, drift);
     return drift;
   }
 
@@ -165,6 +168,19 @@ class Comparison {
     double zeroed = 0.0;
     for (const double error : residual_) zeroed += (error - mean) * (error - mean);
     drift.zeroed_rmse = std::sqrt(zeroed / count);
+  }
+
+  void list_residual(const DirectionFit& fit, Drift& drift) const {
+    drift.residual.reserve(fit.residual.size());
+    for (std::size_t r = 0; r < runs_.size(); ++r)
+      for (const std::size_t n : runs_[r].rows) {
+        const std::size_t row = drift.residual.size();
+        drift.residual.push_back({.record = records_[r],
+                                  .sample = n,
+                                  .value = fit.residual[row],
+                                  .elastic = parts_.elastic[row],
+                                  .stiffness = parts_.stiffness[row]});
+      }
   }
 
   [[nodiscard]] DirectionFit fit_of_directions(bool with_widening) const {
@@ -242,6 +258,7 @@ class Comparison {
   const ModelFile& model_;
   const DriftOptions& options_;
   std::vector<ComparedRun> runs_;
+  std::vector<std::size_t> records_;  ///< their places in the dataset
   double lowest_ = 0.0;
   double highest_ = 0.0;
   double travel_ = 0.0;

@@ -1,0 +1,196 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "common/data_flags.hpp"
+#include "common/output.hpp"
+#include "common/progress_bar.hpp"
+#include "common/report_output.hpp"
+#include "fleet/fleet_text.hpp"
+#include "fleet/watch_text.hpp"
+#include "search/specimen_study.hpp"
+#include "search/study_flags.hpp"
+#include "store/store_flags.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/fleet/calibration.hpp"
+#include "torsio/fleet/watch.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct CalibrateFlags {
+  std::string list;
+  std::string specimens;
+  std::size_t faults = 0;
+  std::string base;
+  std::string model;
+  std::uint64_t seed = kDefaultSeed;
+  bool promotes = false;
+  WorkerFlags worker;
+  JsonOutput json;
+  std::string pages;
+};
+
+struct WatchFlags {
+  std::string list;
+  std::string store;
+  JsonOutput json;
+  ReportOutput report;
+};
+
+torsio::CalibrationRequest request_of(const CalibrateFlags& flags) {
+  if (flags.list.empty() == flags.specimens.empty())
+    throw torsio::UsageError({.place = "torsio fleet calibrate",
+                              .expected = "a list of joints, or --specimens",
+                              .found = flags.list.empty() ? "neither" : "both",
+                              .advice = "torsio fleet calibrate robot.yaml"});
+  torsio::CalibrationRequest request;
+  if (!flags.list.empty()) {
+    request = torsio::read_fleet_list(flags.list);
+  } else {
+    const torsio::SpecimenRequest range = torsio::specimen_range(flags.specimens);
+    request.simulated = {.actuator = range.actuator,
+                         .first = range.first,
+                         .last = range.last,
+                         .faults = flags.faults};
+  }
+  if (!flags.base.empty()) request.base = flags.base;
+  if (!flags.model.empty()) request.model = flags.model;
+  request.seed = flags.seed;
+  return request;
+}
+
+bool is_kept(const CalibrateFlags& flags) {
+  return !flags.worker.store.empty() || !flags.worker.study.empty();
+}
+
+torsio::StoreAddress address_of(const CalibrateFlags& flags) {
+  if (!is_kept(flags)) return {};
+  if (!flags.worker.store.empty()) return torsio::store_address(flags.worker.store);
+  const auto folder = std::filesystem::path(flags.list).parent_path();
+  return torsio::store_address((folder / "torsio-studies.sqlite").string());
+}
+
+/// The page of all joints and one for each.
+void write_pages(const std::string& folder, const torsio::FleetCalibration& fleet) {
+  make_folder(folder);
+  const auto write = [&](const std::string& file, torsio::ReportDocument document) {
+    ReportOutput output;
+    output.destination = (std::filesystem::path(folder) / file).string();
+    output.write(std::move(document));
+  };
+  write("index.html", torsio::fleet_report(fleet));
+  for (std::size_t i = 0; i < fleet.joints.size(); ++i) {
+    std::string file = fleet.joints[i].serial + ".html";
+    std::ranges::replace(file, '/', '_');
+    write(file, torsio::fleet_joint_report(fleet, i));
+  }
+  remark(fmt::format("{} pages written to {}", fleet.joints.size() + 1, folder));
+}
+
+void register_joints(const CalibrateFlags& flags, torsio::StudyStore& store,
+                     const torsio::FleetCalibration& fleet,
+                     const torsio::CalibrationRequest& request) {
+  torsio::Registry registry(store.address(), wait_for_server);
+  const torsio::RegisteredFleet added =
+      torsio::register_fleet(registry, store, fleet, request, flags.promotes, person_here());
+  remark(fmt::format("{} models are in the registry of {}{}", added.models, store.address().name(),
+                     flags.promotes ? fmt::format(", {} became current", added.promoted)
+                                    : "; --promote makes them current"));
+  for (const std::string& refused : added.refused) remark("not made current: " + refused);
+}
+
+void calibrate(CalibrateFlags& flags) {
+  const torsio::CalibrationRequest request = request_of(flags);
+  if (flags.promotes && !is_kept(flags))
+    throw torsio::UsageError({.place = "--promote",
+                              .problem = "models are made current in a store",
+                              .advice = "Add --store FILE.sqlite."});
+  torsio::CalibrationStudy kind(request);
+  torsio::StudyStore store(address_of(flags), wait_for_server);
+  const std::string name = flags.worker.study.empty() ? "calibrate" : flags.worker.study;
+  const torsio::StoredStudy study = torsio::begin_calibration(store, name, request, kind);
+  take_back_of_dead(store, study);
+  ProgressBar progress;
+  torsio::run_workers(store, study, kind, flags.worker.options(), progress.listener());
+  const torsio::FleetCalibration fleet = torsio::calibration_result(store, study);
+  flags.json.write(torsio::fleet_json(fleet));
+  if (flags.json.wants_tables()) print(torsio::fleet_text(fleet));
+  if (is_kept(flags)) register_joints(flags, store, fleet, request);
+  if (!flags.pages.empty()) write_pages(flags.pages, fleet);
+}
+
+void watch(WatchFlags& flags) {
+  DataFlags().check_outputs({flags.json.destination, flags.report.destination, flags.report.plot});
+  torsio::Registry registry(torsio::store_address(flags.store), wait_for_server);
+  std::vector<std::string> failures;
+  if (!flags.list.empty()) {
+    ProgressBar progress;
+    failures =
+        torsio::watch_joints(registry, torsio::read_fleet_list(flags.list), progress.listener());
+  }
+  const std::vector<torsio::WatchedJoint> joints = torsio::rank_by_drift(registry);
+  flags.json.write(torsio::watch_json(joints, failures));
+  if (flags.json.wants_tables()) print(torsio::watch_text(joints));
+  for (const std::string& failure : failures) remark("not compared: " + failure);
+  if (flags.report.is_wanted()) flags.report.write(torsio::watch_report(joints));
+  if (!failures.empty())
+    throw torsio::Error(
+        {.place = flags.list,
+         .problem = fmt::format("{} of its joints could not be compared", failures.size())});
+}
+
+}  // namespace
+
+void add_fleet(CLI::App& app) {
+  CLI::App* verb = app.add_subcommand(
+      "fleet", "calibrate all joints of a robot or a production line, and watch their drift");
+  verb->require_subcommand(1);
+  verb->footer("docs/fleet.md: from the joints of one robot to a production line.");
+
+  auto calibration = std::make_shared<CalibrateFlags>();
+  CLI::App* part = verb->add_subcommand(
+      "calibrate",
+      "check, compare, transfer, fit and evaluate each joint; report those that differ");
+  part->footer("Example: torsio fleet calibrate robot.yaml --store robot.sqlite --report pages");
+  part->add_option("LIST", calibration->list, "joints with their recordings (docs/fleet.md)");
+  part->add_option("--specimens", calibration->specimens,
+                   "in place of a list: simulated specimens with their tolerances: "
+                   "dfki-50#0001..#1000");
+  part->add_option("--faults", calibration->faults,
+                   "so many of the specimens get a fault of production");
+  part->add_option("--base", calibration->base,
+                   "model file that the joints are compared with and start from (default: the "
+                   "list's, else for each type a model of its first joint)");
+  part->add_option("--model", calibration->model, "family to fit (default grey_box)");
+  add_seed(*part, calibration->seed, "seed of the fits and of the simulation");
+  calibration->worker.add(*part,
+                          "SQLite file or postgresql:// URL that keeps study, joints and models "
+                          "(default: torsio-studies.sqlite beside the list, if --study is given)",
+                          "name of the study (default calibrate)");
+  part->add_flag("--promote", calibration->promotes,
+                 "make the models current of joints that do not differ from the others");
+  part->add_option("--json", calibration->json.destination,
+                   "write the results as JSON to a file, or - for standard output");
+  part->add_option("--report", calibration->pages,
+                   "write a page with all joints and one for each into this folder");
+  part->callback([calibration] { calibrate(*calibration); });
+
+  auto watching = std::make_shared<WatchFlags>();
+  part = verb->add_subcommand("watch",
+                              "compare new recordings with the current models, and rank "
+                              "the joints by their drift");
+  part->footer("Example: torsio fleet watch today.yaml --store robot.sqlite");
+  part->add_option("LIST", watching->list,
+                   "joints with their recordings of today; without it, the history is ranked");
+  part->add_option("--store", watching->store, "SQLite file or postgresql:// URL of the registry")
+      ->required();
+  part->add_option("--json", watching->json.destination,
+                   "write the result as JSON to a file, or - for standard output");
+  watching->report.add(*part);
+  part->callback([watching] { watch(*watching); });
+}

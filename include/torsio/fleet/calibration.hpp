@@ -1,0 +1,138 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/estimate.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/fleet/joint_trait.hpp"
+#include "torsio/fleet/outliers.hpp"
+#include "torsio/search/study_kind.hpp"
+#include "torsio/store/study_store.hpp"
+
+namespace torsio {
+
+/// One joint of a fleet.
+struct FleetJoint {
+  std::string serial;
+  std::string type = {};                ///< joints of one type are compared; may be empty
+  std::vector<std::string> train = {};  ///< recordings
+  std::vector<std::string> test = {};   ///< empty: the last 30 % of the others
+};
+
+/// Simulated specimens in place of recordings, some of them with a production fault.
+struct SimulatedFleet {
+  std::string actuator = "dfki-50";
+  std::uint64_t first = 1;  ///< serial numbers, both included
+  std::uint64_t last = 1;
+  std::size_t faults = 0;  ///< number of joints with a fault, drawn by the seed
+};
+
+/// All that a worker needs to calibrate the joints of a fleet.
+struct CalibrationRequest {
+  std::vector<FleetJoint> joints = {};
+  std::optional<SimulatedFleet> simulated = {};  ///< in place of joints
+  std::string mapping = {};
+  double rate_Hz = 0.0;  ///< 0: that of the logs
+  std::string target = {};
+  std::vector<std::string> inputs = {};  ///< empty: the default of the recordings
+  std::string model = "grey_box";        ///< one entry of `model_choices`
+  /// Model file that all joints are compared with and start from; empty: for each type the model of its first
+  /// joint.
+  std::string base = {};
+  std::uint64_t seed = 1;
+};
+
+/// Reads a list of joints (docs/fleet.md); paths are relative to the list.
+/// @throws Error naming file, line, what was expected and found.
+[[nodiscard]] CalibrationRequest read_fleet_list(const std::string& path);
+
+/// What was found about one joint.
+struct CalibratedJoint {
+  struct Method {
+    std::string name;  ///< "base", "transfer: scaled", "own fit"
+    double held_out_rmse =
+        kNotMeasured;  ///< on the last 30 % of the training samples: by it the method is chosen
+    double test_rmse = kNotMeasured;
+  };
+  std::string serial;
+  std::string type = {};
+  std::string fault = {};                      ///< the planted one, of a simulated joint
+  JointTrait fault_trait = JointTrait::noise;  ///< in which it is to be found
+  std::string failure = {};                    ///< why there is no model; empty: there is one
+  std::vector<std::string> warnings = {};      ///< what the checks warn of
+  JointTraits traits = {};
+  std::vector<Method> methods = {};
+  std::string chosen = {};          ///< name of the chosen method
+  double test_rmse = kNotMeasured;  ///< error of the chosen method
+  std::int64_t trial = 0;
+};
+
+/// A joint that differs from the others of its type.
+struct FleetOutlier {
+  std::size_t joint = 0;                 ///< in `FleetCalibration::joints`
+  JointTrait trait = JointTrait::noise;  ///< the kind
+  double value = kNotMeasured;
+  double median = kNotMeasured;  ///< median of its type
+  double expected =
+      kNotMeasured;  ///< number of sound joints of this fleet that lie so far out, at most
+  std::vector<JointTrait> others = {};  ///< further traits that lie outside
+};
+
+/// The result for a fleet.
+struct FleetCalibration {
+  struct OfType {
+    std::string type;
+    std::vector<std::size_t> members = {};             ///< in `FleetCalibration::joints`
+    std::array<OutlierTest, kJointTraits> tests = {};  ///< values, or the logarithms of sizes
+  };
+  std::vector<CalibratedJoint> joints = {};
+  std::vector<OfType> types = {};
+  std::vector<FleetOutlier> outliers = {};  ///< the least expected first
+};
+
+/// The name of this kind in a store.
+inline constexpr std::string_view kCalibrationStudy = "calibrate";
+
+/// One trial for each joint: the recordings are checked; the joint is compared with the base model; the base is
+/// transferred to it, a model is fitted to it, and the better one on held-out samples is its model.
+class CalibrationStudy : public StudyKind {
+ public:
+  explicit CalibrationStudy(CalibrationRequest request);
+  ~CalibrationStudy() override;
+
+  [[nodiscard]] std::vector<Trial> first_trials() const;
+  [[nodiscard]] TrialResult run(const Claim& claim, const Progress& progress) override;
+  [[nodiscard]] HalvingDecision decide(const std::string& /*group*/, int /*step*/,
+                                       std::span<const TrialRecord> /*trials*/) override {
+    return {};
+  }
+
+ private:
+  class Plan;
+  std::unique_ptr<Plan> plan_;
+};
+
+/// The text of a request that is kept in a store, with the hashes of its files.
+[[nodiscard]] std::string calibration_text(const CalibrationRequest& request);
+/// Begins or resumes the study of that name. @throws UsageError as `StudyStore::create_or_resume`.
+[[nodiscard]] StoredStudy begin_calibration(StudyStore& store, const std::string& name,
+                                            const CalibrationRequest& request,
+                                            const CalibrationStudy& kind);
+/// The study of a store. @throws Error if a recording has changed since it began.
+[[nodiscard]] std::unique_ptr<CalibrationStudy> calibration_study(const StoredStudy& study);
+
+/// The results of a study and its outliers, of the joints that have finished.
+[[nodiscard]] FleetCalibration calibration_result(StudyStore& store, const StoredStudy& study);
+
+/// Compares the joints of each type; fills `types` and `outliers`.
+void find_fleet_outliers(FleetCalibration& fleet);
+
+}  // namespace torsio

@@ -1,0 +1,188 @@
+#include "fleet/calibration_text.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "data/byte_source.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+using FleetJson = nlohmann::ordered_json;
+
+[[noreturn]] void refuse_text(const char* what) {
+  throw Error({.place = "store",
+               .problem = std::string(what) + " of this study cannot be read",
+               .advice = "Use the torsio that began it."});
+}
+
+std::string absolute_path(const std::string& path) {
+  // A mapping that comes with torsio has a name, not a path.
+  return path.empty() || !std::filesystem::exists(path)
+             ? path
+             : std::filesystem::absolute(path).lexically_normal().string();
+}
+
+FleetJson number(double value) { return std::isfinite(value) ? FleetJson(value) : FleetJson(); }
+double number_from(const FleetJson& json) {
+  return json.is_null() ? kNotMeasured : json.get<double>();
+}
+
+FleetJson files_json(const std::vector<std::string>& files) {
+  FleetJson json = FleetJson::array();
+  for (const std::string& file : files)
+    json.push_back({{"file", absolute_path(file)}, {"sha256", sha256_of_file(file)}});
+  return json;
+}
+
+std::vector<std::string> files_from(const FleetJson& json,
+                                    std::map<std::string, std::string>& sha256) {
+  std::vector<std::string> files;
+  for (const FleetJson& each : json) {
+    files.push_back(each.at("file"));
+    sha256[files.back()] = each.at("sha256");
+  }
+  return files;
+}
+
+FleetJson traits_json(const JointTraits& traits) {
+  FleetJson json;
+  for (const JointTrait trait : kAllJointTraits) {
+    const JointTraits::Value& of = traits[trait];
+    json[std::string(name(trait))] = {
+        {"value", number(of.value)}, {"std_error", number(of.std_error)}, {"unit", of.unit}};
+  }
+  json["encoder"] = traits.encoder;
+  json["encoder_periods"] = traits.encoder_periods;
+  json["rmse"] = number(traits.rmse);
+  return json;
+}
+
+JointTraits traits_from(const FleetJson& json) {
+  JointTraits traits;
+  for (const JointTrait trait : kAllJointTraits) {
+    const FleetJson& of = json.at(std::string(name(trait)));
+    traits[trait] = {.value = number_from(of.at("value")),
+                     .std_error = number_from(of.at("std_error")),
+                     .unit = of.at("unit")};
+  }
+  traits.encoder = json.at("encoder");
+  traits.encoder_periods = json.at("encoder_periods");
+  traits.rmse = number_from(json.at("rmse"));
+  return traits;
+}
+
+}  // namespace
+
+std::string task_text(const FleetJoint& joint) {
+  return FleetJson{{"serial", joint.serial},
+                   {"type", joint.type},
+                   {"train", files_json(joint.train)},
+                   {"test", files_json(joint.test)}}
+      .dump();
+}
+
+JointTask task_from_text(std::string_view text) {
+  try {
+    const FleetJson json = FleetJson::parse(text);
+    JointTask task;
+    task.joint.serial = json.at("serial");
+    task.joint.type = json.at("type");
+    task.joint.train = files_from(json.at("train"), task.sha256);
+    task.joint.test = files_from(json.at("test"), task.sha256);
+    return task;
+  } catch (const FleetJson::exception&) {
+    refuse_text("a joint");
+  }
+}
+
+std::string calibration_text(const CalibrationRequest& request) {
+  FleetJson json{{"mapping", absolute_path(request.mapping)},
+                 {"rate_Hz", request.rate_Hz},
+                 {"target", request.target},
+                 {"inputs", request.inputs},
+                 {"model", request.model},
+                 {"base", absolute_path(request.base)},
+                 {"base_sha256", request.base.empty() ? "" : sha256_of_file(request.base)},
+                 {"seed", request.seed}};
+  if (request.simulated)
+    json["simulated"] = {{"actuator", request.simulated->actuator},
+                         {"first", request.simulated->first},
+                         {"last", request.simulated->last},
+                         {"faults", request.simulated->faults}};
+  json["joints"] = FleetJson::array();
+  for (const FleetJoint& joint : request.joints)
+    json["joints"].push_back(FleetJson::parse(task_text(joint)));
+  return json.dump();
+}
+
+CalibrationRequest calibration_from_text(std::string_view text) {
+  try {
+    const FleetJson json = FleetJson::parse(text);
+    CalibrationRequest request{.mapping = json.at("mapping"),
+                               .rate_Hz = json.at("rate_Hz"),
+                               .target = json.at("target"),
+                               .inputs = json.at("inputs"),
+                               .model = json.at("model"),
+                               .base = json.at("base"),
+                               .seed = json.at("seed")};
+    if (json.contains("simulated")) {
+      const FleetJson& of = json.at("simulated");
+      request.simulated = {.actuator = of.at("actuator"),
+                           .first = of.at("first"),
+                           .last = of.at("last"),
+                           .faults = of.at("faults")};
+    }
+    for (const FleetJson& joint : json.at("joints"))
+      request.joints.push_back(task_from_text(joint.dump()).joint);
+    return request;
+  } catch (const FleetJson::exception&) {
+    refuse_text("what it calibrates");
+  }
+}
+
+std::string joint_text(const CalibratedJoint& joint) {
+  FleetJson methods = FleetJson::array();
+  for (const CalibratedJoint::Method& of : joint.methods)
+    methods.push_back({{"name", of.name},
+                       {"held_out_rmse", number(of.held_out_rmse)},
+                       {"test_rmse", number(of.test_rmse)}});
+  return FleetJson{{"serial", joint.serial},
+                   {"type", joint.type},
+                   {"fault", joint.fault},
+                   {"fault_trait", static_cast<int>(joint.fault_trait)},
+                   {"failure", joint.failure},
+                   {"warnings", joint.warnings},
+                   {"traits", traits_json(joint.traits)},
+                   {"methods", std::move(methods)},
+                   {"chosen", joint.chosen},
+                   {"test_rmse", number(joint.test_rmse)}}
+      .dump();
+}
+
+CalibratedJoint joint_from_text(std::string_view text) {
+  try {
+    const FleetJson json = FleetJson::parse(text);
+    CalibratedJoint joint{.serial = json.at("serial"),
+                          .type = json.at("type"),
+                          .fault = json.at("fault"),
+                          .fault_trait = static_cast<JointTrait>(json.at("fault_trait").get<int>()),
+                          .failure = json.at("failure"),
+                          .warnings = json.at("warnings"),
+                          .traits = traits_from(json.at("traits")),
+                          .chosen = json.at("chosen"),
+                          .test_rmse = number_from(json.at("test_rmse"))};
+    for (const FleetJson& of : json.at("methods"))
+      joint.methods.push_back({.name = of.at("name"),
+                               .held_out_rmse = number_from(of.at("held_out_rmse")),
+                               .test_rmse = number_from(of.at("test_rmse"))});
+    return joint;
+  } catch (const FleetJson::exception&) {
+    refuse_text("a result");
+  }
+}
+
+}  // namespace torsio

@@ -1,0 +1,66 @@
+#include <filesystem>
+#include <set>
+
+#include "data/yaml_reader.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/fleet/calibration.hpp"
+
+namespace torsio {
+namespace {
+
+std::string beside(const std::string& list, const std::string& path) {
+  const std::filesystem::path own(path);
+  return own.is_absolute()
+             ? path
+             : (std::filesystem::path(list).parent_path() / own).lexically_normal().string();
+}
+
+std::vector<std::string> files_of(const YamlValue& joint, std::string_view key,
+                                  const std::string& list) {
+  const auto yaml = joint.find(key);
+  if (!yaml) return {};
+  std::vector<std::string> files =
+      yaml->is_scalar() ? std::vector<std::string>{yaml->text()} : yaml->texts();
+  for (std::string& file : files) file = beside(list, file);
+  return files;
+}
+
+FleetJoint joint_from(const YamlValue& yaml, const std::string& list) {
+  yaml.allow_only({"serial", "type", "train", "test"});
+  FleetJoint joint{.serial = yaml.at("serial").text(),
+                   .train = files_of(yaml, "train", list),
+                   .test = files_of(yaml, "test", list)};
+  if (const auto type = yaml.find("type")) joint.type = type->text();
+  if (joint.serial.empty()) yaml.at("serial").refuse("a serial number");
+  if (joint.train.empty()) yaml.at("train").refuse("at least one recording");
+  return joint;
+}
+
+}  // namespace
+
+CalibrationRequest read_fleet_list(const std::string& path) {
+  const YamlValue yaml = YamlValue::read(path);
+  yaml.allow_only({"mapping", "target", "sample_rate_Hz", "inputs", "base", "joints"});
+  CalibrationRequest request;
+  if (const auto mapping = yaml.find("mapping")) {
+    request.mapping = mapping->text();
+    // A mapping that comes with torsio has a name, not a path.
+    if (const std::string file = beside(path, request.mapping); std::filesystem::exists(file))
+      request.mapping = file;
+  }
+  if (const auto target = yaml.find("target")) request.target = target->text();
+  if (const auto rate = yaml.find("sample_rate_Hz")) request.rate_Hz = rate->positive_number("Hz");
+  if (const auto inputs = yaml.find("inputs")) request.inputs = inputs->texts();
+  if (const auto base = yaml.find("base")) request.base = beside(path, base->text());
+  const YamlValue joints = yaml.at("joints");
+  std::set<std::string> serials;
+  for (const YamlValue& each : joints.items()) {
+    request.joints.push_back(joint_from(each, path));
+    if (!serials.insert(request.joints.back().serial).second)
+      each.at("serial").refuse("another serial number: the list has each joint once");
+  }
+  if (request.joints.empty()) joints.refuse("at least one joint");
+  return request;
+}
+
+}  // namespace torsio
