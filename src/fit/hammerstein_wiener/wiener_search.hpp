@@ -22,7 +22,7 @@ struct WienerFit {
 /// Relative fall of the sum of squares of one step below which a search has converged.
 inline constexpr double kFineTolerance = 1e-9;
 /// The same while structures are compared, of which those within 1 % are equally good.
-inline constexpr double kCoarseTolerance = 1e-5;
+inline constexpr double kCoarseTolerance = 1e-7;
 
 /// How far a search goes.
 struct WienerLimits {
