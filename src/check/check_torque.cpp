@@ -146,8 +146,8 @@ void Checker::check_position() {
   add(Verdict::pass, "position", "",
       is_examined
           ? "the torque does not depend on the angle of the joint"
-          : fmt::format("not examined: the joint moves too little, {:.2g} times as far as the "
-                        "spring ({:g} are needed); a wrong gear ratio would not be found",
+          : fmt::format("nothing was found, but a wrong gear ratio would not be found: the joint "
+                        "moves {:.2g} times as far as the spring ({:g} are needed)",
                         *travel, kFarTravel),
       is_examined ? ""
                   : "Record the joint once while it moves far without load, and check that "

@@ -9,11 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "check/draft/mapping_draft.hpp"
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "data/log_summary.hpp"
+#include "data/read_log.hpp"
 #include "recordings/check_drive.hpp"
 #include "report/identify.hpp"
 #include "report/log_summary.hpp"
@@ -142,6 +144,8 @@ void list(CheckFlags& flags) {
       ProgressBar progress;
       return torsio::list_log(file, progress.listener());
     }();
+    if (!summary.columns.empty() && summary.clock.empty() && file != "-")
+      torsio::state_clock(torsio::read_log(file, {.csv = {.leaves_out_texts = true}}), summary);
     if (flags.json.wants_tables())
       print((files.size() == 1 ? "" : fmt::format("{}{}:\n", summaries.empty() ? "" : "\n", file)) +
             torsio::log_summary_text(summary));

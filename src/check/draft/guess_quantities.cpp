@@ -8,6 +8,8 @@
 #include "check/draft/column_relations.hpp"
 #include "check/draft/draft_steps.hpp"
 #include "data/mapping/columns.hpp"
+#include "data/mapping/number_coding.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -19,12 +21,24 @@ constexpr double kShortestStep_s = 1.01 / 20e3;
 constexpr double kLongestStep_s = 0.99;
 constexpr double kUsualRate_Hz = 300.0;
 
-constexpr double kCounterSpan = 4294967296.0;  ///< 2^32
+constexpr int kLargestCounter_bits = 32;
 
-bool wraps(const std::vector<double>& stamps) {
-  for (std::size_t i = 1; i < stamps.size(); ++i)
-    if (stamps[i] < stamps[i - 1] - kCounterSpan / 2.0) return true;
-  return false;
+/// The bits of a counter of these stamps that begins again; 0: none does.
+int bits_of_counter(const std::vector<double>& stamps) {
+  constexpr double kNear = 2.0;  // usual steps
+  double back = 0.0;
+  for (std::size_t i = 1; i < stamps.size(); ++i) back = std::max(back, stamps[i - 1] - stamps[i]);
+  if (back > std::exp2(kLargestCounter_bits - 1)) return kLargestCounter_bits;
+  const double step = usual_step(stamps);
+  const auto [lowest, highest] = std::ranges::minmax(stamps);
+  for (const int bits : {16, 24, 31}) {
+    const double span = std::exp2(bits);
+    if (std::abs(back + step - span) > kNear * step || highest - lowest > span) continue;
+    std::vector<double> unwrapped = stamps;
+    unwrap(unwrapped, span);
+    if (std::ranges::is_sorted(unwrapped)) return bits;
+  }
+  return 0;
 }
 
 std::string reason_of_unit(const ColumnSummary& summary) {
@@ -86,7 +100,8 @@ int score_of_clock(const LogColumn& column, const ColumnSummary& summary,
   if (unit != nullptr && unit->si_suffix != "s") return 0;
   const bool is_time = reading.quantity == Quantity::time || unit != nullptr;
   const bool has_order = is_rising(column.values);
-  const bool is_named = is_time && (reading.is_clear || unit != nullptr || wraps(column.values));
+  const bool is_named =
+      is_time && (reading.is_clear || unit != nullptr || bits_of_counter(column.values) > 0);
   if (!has_order && !is_named) return 0;
   if (is_time && has_order) return unit != nullptr ? 7 : reading.is_clear ? 6 : 4;
   if (is_time) return 2;  // it starts again, or rows come late
@@ -114,9 +129,9 @@ void take_as_clock(DraftWork& work, std::size_t column, int score) {
                        : unit != nullptr                                 ? unit->scale
                                                                          : 0.0;
   if (scale > 0.0) work.draft.rate_Hz = usual_rate(stamps, step) / scale;
-  if (wraps(stamps)) {
-    guess.unwrap = kCounterSpan;
-    guess.add(Certainty::likely, "values: a counter of 32 bits begins again");
+  if (const int bits = bits_of_counter(stamps); bits > 0) {
+    guess.unwrap = std::exp2(bits);
+    guess.add(Certainty::likely, fmt::format("values: a counter of {} bits begins again", bits));
   }
   if (unit == nullptr) guess.missing = "the unit of the time: set unit: s, ms, us or ns";
 }
@@ -189,6 +204,26 @@ void guess_quantities(DraftWork& work) {
     }
     guess_one(guess, work.readings[i]);
   }
+}
+
+void state_clock(const LogTable& table, LogSummary& summary) {
+  const MappingDraft draft = [&] {
+    try {
+      return draft_mapping(table);
+    } catch (const Error&) {
+      return MappingDraft{};  // without a motion there is no draft
+    }
+  }();
+  const ColumnGuess* const clock = draft.of("t_s");
+  if (clock == nullptr) return;
+  const LogColumn& column = table.columns[static_cast<std::size_t>(clock - draft.columns.data())];
+  const Unit* const unit = find_unit(clock->unit);
+  if (unit == nullptr || column.values.empty()) return;
+  std::vector<double> stamps = column.values;
+  if (clock->unwrap > 0.0) unwrap(stamps, clock->unwrap);
+  const double scale = column.time == TimeKind::none ? unit->scale : 1.0;
+  summary.clock = clock->summary.name;
+  summary.duration_s = scale * (stamps.back() - stamps.front());
 }
 
 }  // namespace torsio

@@ -35,12 +35,14 @@ bool is_ros(std::string_view column) {
   return column.starts_with('/') && column.find('/', 1) != std::string_view::npos;
 }
 
-/// "ActPos[mdeg]"; a number there may be an index.
-bool has_unknown_brackets(std::string_view column) {
-  if (column.empty() || (column.back() != ']' && column.back() != ')')) return false;
+/// Of "ActPos[mdeg]"; a number there may be an index. Empty: the name does not end in brackets.
+std::string_view text_in_brackets(std::string_view column) {
+  if (column.empty() || (column.back() != ']' && column.back() != ')')) return {};
   const auto open = column.find_last_of(column.back() == ']' ? '[' : '(');
-  return open != std::string_view::npos && open > 0 &&
-         std::isdigit(static_cast<unsigned char>(column[open + 1])) == 0;
+  if (open == std::string_view::npos || open == 0 ||
+      std::isdigit(static_cast<unsigned char>(column[open + 1])) != 0)
+    return {};
+  return without_frame(column.substr(open));
 }
 
 const Logger* logger_of(const LogTable& table) {
@@ -220,6 +222,8 @@ void guess_units(DraftWork& work) {
   });
   for (std::size_t i = 0; i < work.size(); ++i) {
     ColumnGuess& guess = work.draft.columns[i];
+    const std::string_view in_brackets = text_in_brackets(guess.summary.name);
+    if (is_count(in_brackets)) work.readings[i].is_counted = true;
     const NameReading& reading = work.readings[i];
     if (guess.channel.empty() || !guess.unit.empty() || guess.channel == "t_s") continue;
     const std::string_view si = si_unit_of(reading.quantity);
@@ -236,7 +240,7 @@ void guess_units(DraftWork& work) {
       guess.missing = fmt::format("the size of its unit '{}', with unit: and scale:", written);
       guess.scale = scale_of_counts(reading.quantity);
       guess.add(Certainty::unsure, "unit: in the row of units, not known");
-    } else if (has_unknown_brackets(guess.summary.name)) {
+    } else if (!in_brackets.empty() && !is_count(in_brackets)) {
       guess.missing = "the size of the unit in its brackets, with unit: and scale:";
       guess.scale = scale_of_counts(reading.quantity);
       guess.add(Certainty::unsure, "unit: in brackets, not known");

@@ -10,6 +10,7 @@
 
 #include "check/draft/column_relations.hpp"
 #include "check/draft/draft_steps.hpp"
+#include "data/mapping/column_advice.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/measured_recordings.hpp"
 #include "data/mapping/unit_words.hpp"
@@ -115,9 +116,20 @@ bool is_read_with(std::span<const LogTable> tables, MappingDraft& draft) {
   }
 }
 
+constexpr double kExampleLever_m = 0.12;
 constexpr auto kClock = "t_s";
 constexpr auto kGearAngle = "gear_angle_rad";
 constexpr auto kJointAngle = "joint_angle_rad";
+
+/// The line that makes the torque of a force; empty without one.
+std::string torque_of_force(const MappingDraft& draft) {
+  const ColumnGuess* const force = draft.of("force_N");
+  if (force == nullptr) return {};
+  return fmt::format(
+      "; that of a force at a lever of {0:g} m is  torque_Nm: {{from: {1}, unit: {2}, scale: "
+      "{0:g}}}",
+      kExampleLever_m, yaml_name(force->summary.name), force->unit);
+}
 
 /// What `torsio check` needs besides.
 void state_remarks(MappingDraft& draft) {
@@ -126,9 +138,10 @@ void state_remarks(MappingDraft& draft) {
     draft.remarks.emplace_back(
         "no column is a clock: state the sample rate,  rate: 1000Hz  in the mapping or --rate");
   if (draft.of("torque_Nm") == nullptr)
-    draft.remarks.emplace_back(
+    draft.remarks.push_back(
         "no column is the torque of the spring (torque_Nm), the target of a model: name it, or "
-        "compute it from a known load (--load)");
+        "compute it from a known load (--load)" +
+        torque_of_force(draft));
   const bool has_joint = draft.of("joint_angle_rad") != nullptr;
   if (draft.of("spring_deflection_rad") != nullptr ||
       (draft.of("gear_angle_rad") != nullptr && has_joint))

@@ -80,6 +80,10 @@ inline void try_draft(const LogTable& table, MappingDraft& draft) {
   try_draft(std::span(&table, 1), draft);
 }
 
+/// Names the clock of a listed log as its draft does, and how long the log lasts by it; leaves both as they are if no
+/// column is the clock.
+void state_clock(const LogTable& table, LogSummary& summary);
+
 /// A user's answer for a column: a channel with the unit of the numbers ("joint_angle_deg"), "-" for
 /// none, nothing for the guess as it is. The gear ratio is that of the same two angles in the units
 /// stated; without the joint's it is left open. The remarks are those of the new draft.

@@ -18,7 +18,7 @@ struct QuantityWord {
   bool is_clear = true;
 };
 
-// English and German, and the letters of robotics: q the joint's angle, tau a torque.
+// English and German, the French encoder, and the letters of robotics: q the joint's angle, tau a torque.
 constexpr auto kQuantityWords = std::to_array<QuantityWord>({
     {"time", Quantity::time},
     {"timestamp", Quantity::time},
@@ -102,6 +102,9 @@ constexpr auto kQuantityWords = std::to_array<QuantityWord>({
     {"covariance", Quantity::other},
     {"std", Quantity::other},
     {"id", Quantity::other},
+    {"drehgeber", Quantity::angle},
+    {"codeur", Quantity::angle},
+    {"geber", Quantity::angle, false},  // the last one: a "Drehmomentgeber" measures a torque
 });
 
 constexpr auto kSideWords = std::to_array<std::pair<std::string_view, Side>>({
@@ -208,9 +211,9 @@ Side side_of(const std::vector<std::string>& words) {
         at != kSideWords.end())
       side = at->second;
   for (const std::string& word : words)
-    for (const std::string_view part : {"motor", "gelenk", "abtrieb"})
+    for (const std::string_view part : {"motor", "moteur", "gelenk", "abtrieb"})
       if (side == Side::unknown && word.find(part) != std::string::npos)
-        side = part == "motor" ? Side::motor : Side::joint;
+        side = part.starts_with("mot") ? Side::motor : Side::joint;
   return side;
 }
 

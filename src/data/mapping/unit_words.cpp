@@ -123,6 +123,17 @@ constexpr auto kSpellings = std::to_array<Spelling>({
     {"gradcelsius", "degC"},
     {"lbfft", "lbft"},
     {"ftlb", "lbft"},
+    {"ftlbf", "lbft"},
+    {"lb-ft", "lbft"},
+    {"lbf-ft", "lbft"},
+    {"ft-lb", "lbft"},
+    {"ft-lbf", "lbft"},
+    {"lbfin", "lbin"},
+    {"lb-in", "lbin"},
+    {"lbf-in", "lbin"},
+    {"in-lb", "lbin"},
+    {"in-lbf", "lbin"},
+    {"oz-in", "ozin"},
 });
 
 constexpr auto kCounts = std::to_array<std::string_view>(
@@ -131,7 +142,8 @@ constexpr auto kCounts = std::to_array<std::string_view>(
      "inkrement", "inkremente", "incrément", "incréments", "incrementos", "incrementi", "impuls",
      "impulse",   "impulses",   "impulsion", "impulsions", "impulsos",    "impulsi",    "cuentas",
      "schritt",   "schritte",   "step",      "steps",      "lsb",         "raw",        "digit",
-     "digits",    "bit",        "bits",      "adc",        "cpr",         "pulse",      "pulses"});
+     "digits",    "bit",        "bits",      "adc",        "cpr",         "pulse",      "pulses",
+     "imp",       "imps",       "pts"});
 
 /// A sign, and what is written for it in ASCII.
 constexpr auto kSigns = std::to_array<Spelling>({{"°", "deg"},

@@ -14,7 +14,9 @@
 
 #include "check/draft/column_relations.hpp"
 #include "check/draft/logger_styles.hpp"
+#include "check/draft/name_reading.hpp"
 #include "data/csv/csv_table.hpp"
+#include "data/log_summary.hpp"
 #include "data/mapping/measured_recordings.hpp"
 #include "support/error_message.hpp"
 #include "support/file_bytes.hpp"
@@ -216,6 +218,72 @@ TEST(MappingDraft, OfCountsOfTheMotorHasALineThatIsReadOnceItIsComplete) {
   const test::JointState last = test::joint_at(799);
   EXPECT_NEAR(read.front().channel("gear_angle_rad").values.back(),
               last.motor_rad / test::kStyleRatio, 1e-5);
+}
+
+TEST(MappingDraft, TakesCountsInBracketsForThoseOfAnEncoder) {
+  for (const std::string name :
+       {"Motorposition [counts]", "Motorposition [Ink]", "Motorposition [Inkr]",
+        "Motor encoder [counts]", "Encoder motore [imp]", "Motorgeber [Inkr]", "Geber Motor [Ink]",
+        "Codeur moteur [pts]", "Drehgeber Motor (Inc)"}) {
+    std::string text = counted_log();
+    text.replace(text.find("Motorposition"), std::string("Motorposition").size(), name);
+    text.replace(text.find(";Inc;"), 5, ";;");
+    std::string yaml = draft_of(text).yaml();
+    const std::string rule = ", unit: rev, scale: 1/COUNTS, gear_ratio: N}";
+    ASSERT_THAT(yaml, HasSubstr(rule)) << name;
+    EXPECT_THAT(yaml, HasSubstr("# not shown by the data: counts of the motor's encoder")) << name;
+    yaml.replace(yaml.find("# gear_angle_rad"), 2, "");
+    yaml.replace(yaml.find(rule), rule.size(), ", unit: rev, scale: 1/16384, gear_ratio: 80}");
+    const std::vector<Recording> read =
+        measured_recordings(table_of(text), parse_mapping(yaml, "m.yaml"));
+    EXPECT_NEAR(read.front().channel("gear_angle_rad").values.back(),
+                test::joint_at(799).motor_rad / test::kStyleRatio, 1e-5)
+        << name;
+  }
+}
+
+TEST(MappingDraft, TakesAnUnknownUnitInBracketsForNoCounts) {
+  std::string text = counted_log();
+  text.replace(text.find("Motorposition"), std::string("Motorposition").size(),
+               "Motorposition [foo]");
+  text.replace(text.find(";Inc;"), 5, ";;");
+  EXPECT_THAT(draft_of(text).yaml(), HasSubstr("unit: in brackets, not known"));
+  EXPECT_EQ(read_name("Drehmomentgeber").quantity, Quantity::torque);
+  EXPECT_EQ(read_name("Drehmoment Geber").quantity, Quantity::torque);
+}
+
+/// A counter of 16 bits in ms, which begins again; a force at a lever of 0.12 m.
+std::string overflowing_log() {
+  std::string text = "Zaehler [ms];joint [rad];Kraft Messdose [N]\n";
+  for (int row = 0; row < 800; ++row) {
+    const test::JointState state = test::joint_at(row);
+    text += fmt::format("{};{:.6f};{:.5f}\n", (64000 + 4 * row) % 65536, state.joint_rad,
+                        state.torque_Nm / 0.12);
+  }
+  return text;
+}
+
+TEST(MappingDraft, WritesTheSpanOfACounterThatBeginsAgain) {
+  const std::string text = overflowing_log();
+  const MappingDraft draft = draft_of(text);
+  EXPECT_EQ(draft.refusal, "");
+  EXPECT_THAT(draft.yaml(), HasSubstr("t_s: {from: \"Zaehler [ms]\", unit: ms, unwrap: 65536}"));
+  LogSummary summary;
+  state_clock(table_of(text), summary);
+  EXPECT_EQ(summary.clock, "Zaehler [ms]");
+  EXPECT_NEAR(summary.duration_s, 799 * 0.004, 1e-9);
+}
+
+TEST(MappingDraft, OfAForceStatesTheLineOfItsTorque) {
+  const std::string text = overflowing_log();
+  std::string yaml = draft_of(text).yaml();
+  const std::string line = "torque_Nm: {from: \"Kraft Messdose [N]\", unit: N, scale: 0.12}";
+  ASSERT_THAT(yaml, HasSubstr("# Missing: no column is the torque"));
+  ASSERT_THAT(yaml, HasSubstr(line));
+  yaml.insert(yaml.find("\nchannels:\n") + 11, "  " + line + "\n");
+  const std::vector<Recording> read =
+      measured_recordings(table_of(text), parse_mapping(yaml, "m.yaml"));
+  EXPECT_NEAR(read.front().channel("torque_Nm").values.back(), test::joint_at(799).torque_Nm, 1e-5);
 }
 
 TEST(MappingDraft, ReadsNoUnitThatHasTwoMeaningsOrNone) {
