@@ -225,7 +225,8 @@ Results results_of(const ModelFile& file, const Dataset& dataset, const Estimato
       std::ranges::move(offset_warnings(estimator, dataset, kRoles[i], scores[i]),
                         std::back_inserter(results.warnings));
   }
-  std::ranges::move(left_range_warnings(estimator.settings(), dataset, !results.warnings.empty()),
+  std::ranges::move(left_range_warnings(estimator.settings(), estimator.model(), dataset,
+                                        !results.warnings.empty()),
                     std::back_inserter(results.warnings));
   return results;
 }

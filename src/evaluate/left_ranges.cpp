@@ -10,6 +10,7 @@
 
 #include "core/all_finite.hpp"
 #include "data/recording_rows.hpp"
+#include "evaluate/unused_inputs.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
@@ -71,7 +72,8 @@ std::string advice(const InputCourse& course, double lowest, double highest, boo
 }  // namespace
 
 std::vector<std::string> left_range_warnings(const EstimatorSettings& settings,
-                                             const Dataset& dataset, bool has_offset) {
+                                             const AnyModel& model, const Dataset& dataset,
+                                             bool has_offset) {
   FeaturePipeline pipeline(settings.features, settings.sample_rate_Hz);
   const FeatureRanges& trained = settings.ranges;
   InputCourses courses{.inputs = std::vector<InputCourse>(pipeline.feature_count())};
@@ -89,8 +91,10 @@ std::vector<std::string> left_range_warnings(const EstimatorSettings& settings,
         "the samples, which a guard reports; {}",
         settings.features.inputs[j], course.lowest, course.highest, trained.lowest[j],
         trained.highest[j], 100.0 * share,
-        has_offset ? "remove the offset first, then evaluate again"
-                   : advice(course, trained.lowest[j], trained.highest[j], pipeline.is_rate(j))));
+        is_without_effect(model, j)
+            ? "it has no effect on this model: fit again with --inputs, without it"
+        : has_offset ? "remove the offset first, then evaluate again"
+                     : advice(course, trained.lowest[j], trained.highest[j], pipeline.is_rate(j))));
   }
   return warnings;
 }

@@ -59,9 +59,10 @@ std::string advice_sentence(const Drift& drift) {
   if (!std::isfinite(drift.calibration_rmse))
     return "The model file states no error: whether a new calibration is worth it cannot be "
            "determined.";
+  const std::string factor = fmt::format("{:.2g}", drift.zeroed_rmse / drift.calibration_rmse);
   const std::string ratio =
-      fmt::format("With the zero set, the error is {:.2g} times that of the calibration",
-                  drift.zeroed_rmse / drift.calibration_rmse);
+      fmt::format("With the zero set, the error is {} that of the calibration",
+                  factor == "1" ? "about" : factor + " times");
   switch (drift.advice) {
     case DriftAdvice::none: return ratio + ": a new calibration is not worth it.";
     case DriftAdvice::set_zero:

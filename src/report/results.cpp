@@ -173,8 +173,8 @@ std::string note_on_samples(const Ranking& ranking) {
   if (guarded > kCannotBeIgnored)
     return fmt::format(
         "WARNING: in {:.1f} % of the samples a guard reported a fault of a model.\n"
-        "Errors are on the other {:.1f} %; torsio check shows which inputs leave the range of the "
-        "training data.\n",
+        "Errors are on the other {:.1f} %; torsio check TRAINING.csv --test TEST.csv shows which "
+        "inputs leave the range of the training data.\n",
         100.0 * guarded, 100.0 * (1.0 - guarded));
   return fmt::format(
       "errors on {} of the {} samples at which the sensor gave a new value; in the others a guard "

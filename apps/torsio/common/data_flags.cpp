@@ -234,7 +234,9 @@ void DataFlags::remark_on_reading(std::span<const torsio::Recording* const> reco
   }
   for (const auto& [note, files] : files_of_note) {
     const std::string more =
-        files.size() > 1 ? fmt::format(" and {} other files", files.size() - 1) : std::string();
+        files.size() > 1
+            ? fmt::format(" and {} other file{}", files.size() - 1, files.size() > 2 ? "s" : "")
+            : std::string();
     remark(fmt::format("{}{}: {}", files.front(), more, note));
   }
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "common/report_output.hpp"
 #include "common/report_text.hpp"
 #include "evaluate/compared_target.hpp"
+#include "evaluate/slope_change.hpp"
 #include "report/html/model_report.hpp"
 #include "report/model_description.hpp"
 #include "torsio/core/error.hpp"
@@ -102,7 +104,8 @@ void run(EvaluateFlags& flags) {
   warn_of_missing_zeros(file, dataset);
   const std::vector<torsio::ScoredRun> runs = torsio::scored_runs(
       torsio::make_estimator(file, dataset.sample_rate_Hz()), dataset, progress.listener());
-  const torsio::Results results = torsio::evaluate_model(file, dataset, runs);
+  torsio::Results results = torsio::evaluate_model(file, dataset, runs);
+  std::ranges::move(torsio::slope_warnings(file, runs), std::back_inserter(results.warnings));
   warn_of_another_unit(file, dataset);
   if (!flags.predictions.empty())
     torsio::write_recording(prediction_recording(runs.front()), flags.predictions);

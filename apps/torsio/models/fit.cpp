@@ -13,6 +13,7 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "common/report_text.hpp"
+#include "evaluate/unused_inputs.hpp"
 #include "files/training_checkpoint.hpp"
 #include "report/fit_report.hpp"
 #include "torsio/core/error.hpp"
@@ -133,6 +134,26 @@ void run_each_joint(const FitFlags& flags) {
   }
 }
 
+/// Its range would guard all the same.
+void remark_inputs_without_effect(const torsio::ModelFile& file) {
+  const torsio::AnyModel model(file.parameters);
+  const std::vector<std::string>& inputs = file.settings.features.inputs;
+  std::vector<std::string> without;
+  std::string others;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    if (torsio::is_without_effect(model, i))
+      without.push_back(inputs[i]);
+    else
+      others += (others.empty() ? "" : ",") + inputs[i];
+  }
+  if (!without.empty())
+    remark(fmt::format(
+        "{} {} no effect on this model, but a guard reports where {} range is left: "
+        "leave {} out with  --inputs '{}'",
+        fmt::join(without, " and "), without.size() > 1 ? "have" : "has",
+        without.size() > 1 ? "their" : "its", without.size() > 1 ? "them" : "it", others));
+}
+
 void run(FitFlags& flags) {
   if (flags.list) return print(family_list());
   if (flags.output.find(kJointPlace) != std::string::npos) return run_each_joint(flags);
@@ -178,6 +199,7 @@ void run_one(FitFlags& flags) {
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());
   for (const std::string& note : trained.notes) remark_note(note);
+  remark_inputs_without_effect(trained.file);
   for (const torsio::ResultRow& row : results.rows)
     if (row.status != "ok" && !row.recording)
       remark(fmt::format("warning: {} on {}: {}", row.status, torsio::name(row.split), row.reason));

@@ -35,7 +35,7 @@ bool is_ros(std::string_view column) {
   return column.starts_with('/') && column.find('/', 1) != std::string_view::npos;
 }
 
-/// Of "ActPos[mdeg]"; a number there may be an index. Empty: the name does not end in brackets.
+/// The "mdeg" in "ActPos[mdeg]"; a number there may be an index. Empty: the name does not end in brackets.
 std::string_view text_in_brackets(std::string_view column) {
   if (column.empty() || (column.back() != ']' && column.back() != ')')) return {};
   const auto open = column.find_last_of(column.back() == ']' ? '[' : '(');
