@@ -6,14 +6,14 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "fleet/calibration.hpp"
 #include "fleet/fleet_text.hpp"
 #include "fleet/study_kinds.hpp"
+#include "fleet/watch.hpp"
 #include "fleet/watch_text.hpp"
 #include "report/cross_validation.hpp"
 #include "search/specimen_study.hpp"
 #include "torsio/core/version.hpp"
-#include "torsio/fleet/calibration.hpp"
-#include "torsio/fleet/watch.hpp"
 #include "torsio/search/structure_study.hpp"
 #include "torsio/search/workers.hpp"
 #include "torsio/store/registry.hpp"

@@ -62,7 +62,7 @@ def test_a_search_is_a_study_with_trials(fleet_list, tmp_path):
     document = torsio.Study.search(
         recordings, store=store, name="elbow", models="linear,linear_coulomb", folds=2, threads=1
     )
-    assert {row["family"] for row in document["ranking"]} == {"linear", "linear_coulomb"}
+    assert {row["family"] for row in document["summary"]} == {"linear", "linear_coulomb"}
     study = torsio.Study(store, "elbow")
     trials = study.trials()
     assert len(trials) == 4

@@ -10,6 +10,7 @@
 
 #include "data/byte_source.hpp"
 #include "evaluate/fit_and_score.hpp"
+#include "fleet/calibration.hpp"
 #include "fleet/calibration_text.hpp"
 #include "fleet/joint_traits.hpp"
 #include "fleet/production_fault.hpp"
@@ -21,7 +22,6 @@
 #include "torsio/evaluate/evaluate.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/fit/transfer.hpp"
-#include "torsio/fleet/calibration.hpp"
 
 namespace torsio {
 namespace {
@@ -113,7 +113,7 @@ class CalibrationStudy::Plan {
       joint.failure = error.what();
     }
     TrialResult result{.is_failed = !joint.failure.empty(),
-                       .value = joint.test_rmse,
+                       .value = request_.only_compares ? joint.traits.rmse : joint.test_rmse,
                        .reason = joint.failure,
                        .result = joint_text(joint)};
     if (model) {
@@ -149,7 +149,7 @@ class CalibrationStudy::Plan {
     return model_choices(dataset, request_.model, request_.inputs).front();
   }
 
-  /// Its model; none, with a failure, where the checks fail.
+  /// Its model; none where the checks fail (`failure`) or joints are only compared.
   std::optional<ModelFile> calibrate(const FleetJoint& of, CalibratedJoint& joint,
                                      const Progress& progress) {
     if (request_.simulated)
@@ -164,6 +164,7 @@ class CalibrationStudy::Plan {
     const std::shared_ptr<const ModelFile> base = base_of(of.type, progress);
     joint.traits = joint_traits(*base, all_as(dataset, Role::test), progress);
 
+    if (request_.only_compares) return std::nullopt;
     joint.methods.push_back(
         {.name = kBase, .test_rmse = rmse_on(*base, dataset, Role::test, progress)});
     const std::optional<TransferTrial> best = transferred(*base, dataset, joint, progress);
@@ -189,6 +190,8 @@ class CalibrationStudy::Plan {
                       : joint.chosen == kBase ? *base
                                               : best->file;
     model.card.device_serial = of.serial;
+    model.card.held_out = "the test recordings of its joint";
+    model.card.metrics = {{"rmse", joint.test_rmse}};
     return model;
   }
 

@@ -107,7 +107,8 @@ std::string calibration_text(const CalibrationRequest& request) {
                  {"model", request.model},
                  {"base", absolute_path(request.base)},
                  {"base_sha256", request.base.empty() ? "" : sha256_of_file(request.base)},
-                 {"seed", request.seed}};
+                 {"seed", request.seed},
+                 {"only_compares", request.only_compares}};
   if (request.simulated)
     json["simulated"] = {{"actuator", request.simulated->actuator},
                          {"first", request.simulated->first},
@@ -128,7 +129,8 @@ CalibrationRequest calibration_from_text(std::string_view text) {
                                .inputs = json.at("inputs"),
                                .model = json.at("model"),
                                .base = json.at("base"),
-                               .seed = json.at("seed")};
+                               .seed = json.at("seed"),
+                               .only_compares = json.at("only_compares")};
     if (json.contains("simulated")) {
       const FleetJson& of = json.at("simulated");
       request.simulated = {.actuator = of.at("actuator"),

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "torsio/fleet/calibration.hpp"
+#include "fleet/calibration.hpp"
 
 namespace torsio {
 

@@ -2,8 +2,8 @@
 #include <set>
 
 #include "data/yaml_reader.hpp"
+#include "fleet/calibration.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/fleet/calibration.hpp"
 
 namespace torsio {
 namespace {

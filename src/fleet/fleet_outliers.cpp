@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "fleet/calibration.hpp"
 #include "fleet/calibration_text.hpp"
-#include "torsio/fleet/calibration.hpp"
 
 namespace torsio {
 namespace {

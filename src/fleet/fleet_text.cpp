@@ -98,7 +98,7 @@ TextTable joint_table(const FleetCalibration& fleet, std::size_t most) {
   table.header({"joint", "model", "RMSE", "RMSE of the base", "warnings"});
   for (const CalibratedJoint& joint : fleet.joints) {
     if (table.rows().size() == most) break;
-    if (!joint.failure.empty()) {
+    if (joint.chosen.empty()) {
       table.row({joint.serial, "none", "-", short_value(joint.traits.rmse), joint.failure});
       continue;
     }
@@ -114,11 +114,19 @@ std::string plural(std::size_t count, const char* one) {
 }
 
 std::string head_text(const FleetCalibration& fleet) {
-  const auto failed = static_cast<std::size_t>(std::ranges::count_if(
-      fleet.joints, [](const CalibratedJoint& joint) { return !joint.failure.empty(); }));
+  const auto count_of = [&](const auto& is_counted) {
+    return static_cast<std::size_t>(std::ranges::count_if(fleet.joints, is_counted));
+  };
+  const std::size_t failed =
+      count_of([](const CalibratedJoint& joint) { return !joint.failure.empty(); });
+  const std::size_t models =
+      count_of([](const CalibratedJoint& joint) { return !joint.chosen.empty(); });
+  const std::size_t sound = fleet.joints.size() - failed;
   return fmt::format(
-      "{}: {} with a model, {} without; {} from the others of its type",
-      plural(fleet.joints.size(), "joint"), fleet.joints.size() - failed, failed,
+      "{}: {}, {}; {} from the others of its type", plural(fleet.joints.size(), "joint"),
+      models == 0 ? fmt::format("{} compared", sound) : fmt::format("{} with a model", models),
+      models == 0 ? fmt::format("{} not", failed)
+                  : fmt::format("{} without", fleet.joints.size() - models),
       fleet.outliers.size() == 1 ? "1 differs" : fmt::format("{} differ", fleet.outliers.size()));
 }
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/fleet/calibration.hpp"
+#include "fleet/calibration.hpp"
 #include "torsio/report/document/report_document.hpp"
 #include "torsio/report/text_table.hpp"
 

@@ -5,12 +5,12 @@
 #include <string_view>
 #include <vector>
 
+#include "fleet/joint_trait.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/evaluate/drift.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/fleet/joint_trait.hpp"
 
 namespace torsio {
 

@@ -1,4 +1,4 @@
-#include "torsio/fleet/outliers.hpp"
+#include "fleet/outliers.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kLeastMembers = 8;
 constexpr std::size_t kMembersOfTail = 100;
 constexpr double kTailFrom = 0.75;
-constexpr double kTailUpTo = 0.97;
+constexpr double kTailUpTo = 0.985;
 
 /// P(X > u + y) of a generalised Pareto tail, without the share of the tail.
 double survival(double y, double shape, double scale) {
@@ -72,9 +72,9 @@ class ParetoTail : public Tail {
 
   /// The parameters within the likelihood region of 95 %, on a grid.
   void find_likely_tails(const std::vector<double>& excess, std::size_t censored) {
-    constexpr int kShapes = 23;
+    constexpr int kShapes = 21;
     constexpr double kLowestShape = -1.0;  // a uniform distribution
-    constexpr double kHighestShape = 0.1;
+    constexpr double kHighestShape = 0.0;  // an exponential one
     constexpr int kScales = 97;
     constexpr double kScaleRange = 8.0;
     double mean = 0.0;
@@ -169,7 +169,7 @@ double limit_of(const Tail& tail, double members, const OutlierOptions& options,
 
 /// Those that are found do not belong to the population whose tail is fitted: it is fitted again without them.
 void examine_side(OutlierTest& test, double side, double members, const OutlierOptions& options) {
-  constexpr int kMaxRounds = 5;
+  constexpr int kMaxRounds = 2;
   std::size_t found = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<double> distances;

@@ -107,7 +107,8 @@ std::optional<ProductionFault> planted_fault(const SimulatedFleet& fleet, std::u
   std::vector<std::pair<std::uint64_t, std::uint64_t>> order;
   order.reserve(fleet.last + 1 - fleet.first);
   for (std::uint64_t each = fleet.first; each <= fleet.last; ++each)
-    order.emplace_back(text_hash(fmt::format("production fault {} {}", seed, each)), each);
+    order.emplace_back(Random(text_hash(fmt::format("production fault {} {}", seed, each))).bits(),
+                       each);
   const std::size_t count = std::min(fleet.faults, order.size());
   std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(count));
   for (std::size_t k = 0; k < count; ++k)

@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "fleet/calibration.hpp"
 #include "torsio/data/dataset.hpp"
-#include "torsio/fleet/calibration.hpp"
 
 namespace torsio {
 

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "fleet/calibration.hpp"
 #include "search/specimen_study.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/fleet/calibration.hpp"
 #include "torsio/search/structure_study.hpp"
 
 namespace torsio {

@@ -1,4 +1,4 @@
-#include "torsio/fleet/watch.hpp"
+#include "fleet/watch.hpp"
 
 #include <fmt/format.h>
 
@@ -196,7 +196,7 @@ RegisteredFleet register_fleet(Registry& registry, StudyStore& store, const Flee
   for (std::size_t i = 0; i < fleet.joints.size(); ++i) {
     const CalibratedJoint& joint = fleet.joints[i];
     registry.add_device({.serial = joint.serial, .type = joint.type});
-    if (!joint.failure.empty()) continue;
+    if (joint.chosen.empty()) continue;  // no model was made
     const std::optional<RegisteredModel> before = registry.current(joint.serial);
     NewModel added{.device = joint.serial,
                    .bytes = store.samples(joint.trial),

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/fleet/watch.hpp"
+#include "fleet/watch.hpp"
 #include "torsio/report/document/report_document.hpp"
 
 namespace torsio {

@@ -19,9 +19,9 @@
 // run by itself from then on, where it is found out.
 namespace torsio {
 
-/// Of trials that are run only by a worker that runs nothing else.
+/// The condition for trials that run only in a worker that runs nothing else.
 constexpr std::string_view kRunsAlone = "lost NOT IN (0, -1)";
-/// Of all others.
+/// The condition for all others.
 constexpr std::string_view kRunsWithOthers = "lost IN (0, -1)";
 
 /// Takes back all running trials of the workers for which `is_lost`, in the transaction of the caller.

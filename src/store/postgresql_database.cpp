@@ -208,7 +208,8 @@ class PostgresqlDatabase final : public Database {
  private:
   /// Calls a function of libpq that has the parameters of a connection.
   template <class Function>
-  auto call_with_url(Function function, const char* timeout_s) const {
+  std::invoke_result_t<Function, const char* const*, const char* const*, int> call_with_url(
+      Function function, const char* timeout_s) const {
     constexpr auto kKeywords = std::to_array<const char*>(
         {"dbname", "application_name", "connect_timeout", "keepalives", "keepalives_idle",
          "keepalives_interval", "keepalives_count", "client_encoding", nullptr});

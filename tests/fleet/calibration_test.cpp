@@ -1,4 +1,4 @@
-#include "torsio/fleet/calibration.hpp"
+#include "fleet/calibration.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,6 +14,7 @@
 #include "fleet/fleet_text.hpp"
 #include "fleet/joint_traits.hpp"
 #include "fleet/production_fault.hpp"
+#include "fleet/watch.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
@@ -22,7 +23,6 @@
 #include "torsio/data/recording.hpp"
 #include "torsio/data/write.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/fleet/watch.hpp"
 #include "torsio/search/workers.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 #include "torsio/store/registry.hpp"
@@ -264,6 +264,21 @@ TEST_F(CalibrationStudyTest, EachJointGetsItsOwnModel) {
   ASSERT_EQ(ranked.size(), 2U);
   EXPECT_EQ(ranked.front().comparisons, 1U);
   EXPECT_GE(ranked.front().severity, ranked.back().severity);
+}
+
+TEST_F(CalibrationStudyTest, JointsThatAreOnlyComparedGetNoModel) {
+  request_.only_compares = true;
+  StudyStore store({.kind = StoreAddress::Kind::memory, .target = {}});
+  CalibrationStudy kind(request_);
+  const StoredStudy study = study_in(store, kind);
+  run_workers(store, study, kind, {.threads = 1});
+  const FleetCalibration fleet = calibration_result(store, study);
+  EXPECT_THAT(fleet_text(fleet), HasSubstr("2 joints: 2 compared, 0 not"));
+  for (const CalibratedJoint& joint : fleet.joints) {
+    EXPECT_EQ(joint.chosen, "");
+    EXPECT_TRUE(std::isfinite(joint.traits[JointTrait::stiffness].value));
+    EXPECT_EQ(store.samples(joint.trial), "");
+  }
 }
 
 TEST_F(CalibrationStudyTest, ARecordingThatHasChangedIsRefused) {

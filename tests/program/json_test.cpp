@@ -50,6 +50,9 @@ const JsonCase kCases[] = {
     {"EvaluateAModelAlone", kModel, "evaluate m.safetensors"},
     {"Convert", kRecord, "convert a.csv -o a.mcap"},
     {"Fit", kRecord, "fit a.csv --model linear -o m.safetensors"},
+    {"FleetCalibrate", "",
+     "fleet calibrate --specimens 'dfki-50#0001..#0002' --only-compare --model linear"},
+    {"FleetWatch", kStored, "fleet watch --store torsio-studies.sqlite"},
     {"Joint", "", "joint --unix joint --fast --duration 1s"},
     {"Import", "",
      "import '" TORSIO_SOURCE "/tests/golden/import/weights_mlp.json' --activation softsign "

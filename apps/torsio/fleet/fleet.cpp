@@ -10,14 +10,14 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "fleet/calibration.hpp"
 #include "fleet/fleet_text.hpp"
+#include "fleet/watch.hpp"
 #include "fleet/watch_text.hpp"
 #include "search/specimen_study.hpp"
 #include "search/study_flags.hpp"
 #include "store/store_flags.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/fleet/calibration.hpp"
-#include "torsio/fleet/watch.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -30,6 +30,7 @@ struct CalibrateFlags {
   std::string model;
   std::uint64_t seed = kDefaultSeed;
   bool promotes = false;
+  bool only_compares = false;
   WorkerFlags worker;
   JsonOutput json;
   std::string pages;
@@ -61,6 +62,7 @@ torsio::CalibrationRequest request_of(const CalibrateFlags& flags) {
   if (!flags.base.empty()) request.base = flags.base;
   if (!flags.model.empty()) request.model = flags.model;
   request.seed = flags.seed;
+  request.only_compares = flags.only_compares;
   return request;
 }
 
@@ -78,18 +80,17 @@ torsio::StoreAddress address_of(const CalibrateFlags& flags) {
 /// The page of all joints and one for each.
 void write_pages(const std::string& folder, const torsio::FleetCalibration& fleet) {
   make_folder(folder);
-  const auto write = [&](const std::string& file, torsio::ReportDocument document) {
-    ReportOutput output;
-    output.destination = (std::filesystem::path(folder) / file).string();
-    output.write(std::move(document));
-  };
-  write("index.html", torsio::fleet_report(fleet));
-  for (std::size_t i = 0; i < fleet.joints.size(); ++i) {
-    std::string file = fleet.joints[i].serial + ".html";
+  const auto path_of = [&](std::string file) {
     std::ranges::replace(file, '/', '_');
-    write(file, torsio::fleet_joint_report(fleet, i));
-  }
-  remark(fmt::format("{} pages written to {}", fleet.joints.size() + 1, folder));
+    return (std::filesystem::path(folder) / file).string();
+  };
+  ReportOutput all;
+  all.destination = path_of("index.html");
+  all.write(torsio::fleet_report(fleet));
+  for (std::size_t i = 0; i < fleet.joints.size(); ++i)
+    write_text(path_of(fleet.joints[i].serial + ".html"),
+               torsio::report_html(torsio::fleet_joint_report(fleet, i)));
+  remark(fmt::format("a page for each of {} joints written to {}", fleet.joints.size(), folder));
 }
 
 void register_joints(const CalibrateFlags& flags, torsio::StudyStore& store,
@@ -106,6 +107,10 @@ void register_joints(const CalibrateFlags& flags, torsio::StudyStore& store,
 
 void calibrate(CalibrateFlags& flags) {
   const torsio::CalibrationRequest request = request_of(flags);
+  if (flags.promotes && flags.only_compares)
+    throw torsio::UsageError(
+        {.place = "--promote",
+         .problem = "--only-compare makes no models that could become current"});
   if (flags.promotes && !is_kept(flags))
     throw torsio::UsageError({.place = "--promote",
                               .problem = "models are made current in a store",
@@ -172,6 +177,9 @@ void add_fleet(CLI::App& app) {
                           "SQLite file or postgresql:// URL that keeps study, joints and models "
                           "(default: torsio-studies.sqlite beside the list, if --study is given)",
                           "name of the study (default calibrate)");
+  part->add_flag("--only-compare", calibration->only_compares,
+                 "make no models: only find the joints that differ, as at the end of a production "
+                 "line");
   part->add_flag("--promote", calibration->promotes,
                  "make the models current of joints that do not differ from the others");
   part->add_option("--json", calibration->json.destination,

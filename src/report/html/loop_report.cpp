@@ -1,4 +1,4 @@
-#include "torsio/report/html/loop_report.hpp"
+#include "report/html/loop_report.hpp"
 
 #include <fmt/format.h>
 

@@ -40,20 +40,20 @@ struct OutlierOptions {
   double tolerance = 0.0;
 };
 
-/// Finds members that do not belong to a population, of which at most 3 % on each side may be outliers.
+/// Finds members that do not belong to a population, of which at most 1.5 % on each side may be outliers.
 ///
 /// From 100 values on, the tail on each side is a generalised Pareto distribution (Pickands 1975) of
 /// the excess y over the quantile u at 75 %:
 ///
 ///     P(X > u + y) = 0.25 (1 + xi y / sigma)^(-1 / xi)
 ///
-/// fitted by maximum likelihood to the values up to the quantile at 97 %, those beyond being censored,
-/// and again without the outliers that it shows; xi is between -1 (a uniform distribution) and 0.1. The
-/// probability is the largest within the likelihood region of 95 %. A population with bounds (xi < 0), as one of
-/// parts within tolerances, thus has narrow limits, one with long tails wide ones. With fewer values, from 8
-/// on, the distance over 1.4826 times the median absolute deviation is taken as Student's t with a third of
-/// n - 1 degrees of freedom, since this deviation has the efficiency 0.37. With fewer than 8 no member is an
-/// outlier.
+/// fitted by maximum likelihood to the values up to the quantile at 98.5 %, those beyond being censored,
+/// and again without the outliers that it shows; xi is between -1 (a uniform distribution) and 0 (an
+/// exponential one). The probability is the largest within the likelihood region of 95 %. A population
+/// with bounds (xi < 0), as one of parts within tolerances, thus has narrow limits, one with long tails
+/// wide ones. With fewer values, from 8 on, the distance over 1.4826 times the median absolute deviation
+/// is taken as Student's t with a third of n - 1 degrees of freedom, since this deviation has the
+/// efficiency 0.37. With fewer than 8 no member is an outlier.
 [[nodiscard]] OutlierTest find_outliers(std::span<const double> values,
                                         const OutlierOptions& options = {});
 

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "fleet/calibration.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/evaluate/drift.hpp"
-#include "torsio/fleet/calibration.hpp"
 #include "torsio/store/registry.hpp"
 
 namespace torsio {

@@ -10,10 +10,10 @@
 #include <string_view>
 #include <vector>
 
+#include "fleet/joint_trait.hpp"
+#include "fleet/outliers.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
-#include "torsio/fleet/joint_trait.hpp"
-#include "torsio/fleet/outliers.hpp"
 #include "torsio/search/study_kind.hpp"
 #include "torsio/store/study_store.hpp"
 
@@ -48,6 +48,7 @@ struct CalibrationRequest {
   /// joint.
   std::string base = {};
   std::uint64_t seed = 1;
+  bool only_compares = false;  ///< no models are made: the test at the end of a production line
 };
 
 /// Reads a list of joints (docs/fleet.md); paths are relative to the list.
