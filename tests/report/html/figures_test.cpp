@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "report/html/loop_report.hpp"
 #include "report/html/speed_loops.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "report/monitor.hpp"
@@ -16,7 +17,6 @@
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/report/html/loop_report.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
