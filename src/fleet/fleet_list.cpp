@@ -1,4 +1,7 @@
+#include <fmt/format.h>
+
 #include <filesystem>
+#include <map>
 #include <set>
 
 #include "data/yaml_reader.hpp"
@@ -54,10 +57,19 @@ CalibrationRequest read_fleet_list(const std::string& path) {
   if (const auto base = yaml.find("base")) request.base = beside(path, base->text());
   const YamlValue joints = yaml.at("joints");
   std::set<std::string> serials;
+  std::map<std::string, std::string> joint_of;  // a recording
   for (const YamlValue& each : joints.items()) {
     request.joints.push_back(joint_from(each, path));
     if (!serials.insert(request.joints.back().serial).second)
       each.at("serial").refuse("another serial number: the list has each joint once");
+    const FleetJoint& joint = request.joints.back();
+    for (const std::vector<std::string>* files : {&joint.train, &joint.test})
+      for (const std::string& file : *files)
+        if (const auto [known, is_new] = joint_of.emplace(file, joint.serial); !is_new)
+          throw Error({.place = each.place(),
+                       .problem = "a recording is listed twice",
+                       .expected = "recordings of this joint alone, each once",
+                       .found = fmt::format("{}, listed for {}", file, known->second)});
   }
   if (request.joints.empty()) joints.refuse("at least one joint");
   return request;

@@ -60,6 +60,10 @@ TEST(FleetListTest, ErrorsNameFileAndLine) {
   EXPECT_THAT(message("joints:\n  - {serial: A, trian: a.csv}\n"),
               HasSubstr("Did you mean 'train'"));
   EXPECT_THAT(message("joints:\n  - {serial: A}\n"), HasSubstr("train"));
+  EXPECT_THAT(
+      message(
+          "joints:\n  - {serial: A, train: a.csv}\n  - {serial: B, train: b.csv, test: a.csv}\n"),
+      testing::AllOf(HasSubstr("listed twice"), HasSubstr("listed for A")));
   EXPECT_THAT(message("joints: []\n"), HasSubstr("at least one joint"));
   EXPECT_THAT(message(""), HasSubstr("found nothing"));
 }

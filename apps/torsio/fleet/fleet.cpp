@@ -38,8 +38,7 @@ struct CalibrateFlags {
 
 struct WatchFlags {
   std::string list;
-  std::string store;
-  JsonOutput json;
+  StoreFlags store;
   ReportOutput report;
 };
 
@@ -130,17 +129,18 @@ void calibrate(CalibrateFlags& flags) {
 }
 
 void watch(WatchFlags& flags) {
-  DataFlags().check_outputs({flags.json.destination, flags.report.destination, flags.report.plot});
-  torsio::Registry registry(torsio::store_address(flags.store), wait_for_server);
+  DataFlags().check_outputs(
+      {flags.store.json.destination, flags.report.destination, flags.report.plot});
+  const std::unique_ptr<torsio::Registry> registry = flags.store.open();
   std::vector<std::string> failures;
   if (!flags.list.empty()) {
     ProgressBar progress;
     failures =
-        torsio::watch_joints(registry, torsio::read_fleet_list(flags.list), progress.listener());
+        torsio::watch_joints(*registry, torsio::read_fleet_list(flags.list), progress.listener());
   }
-  const std::vector<torsio::WatchedJoint> joints = torsio::rank_by_drift(registry);
-  flags.json.write(torsio::watch_json(joints, failures));
-  if (flags.json.wants_tables()) print(torsio::watch_text(joints));
+  const std::vector<torsio::WatchedJoint> joints = torsio::rank_by_drift(*registry);
+  flags.store.json.write(torsio::watch_json(joints, failures));
+  if (flags.store.json.wants_tables()) print(torsio::watch_text(joints));
   for (const std::string& failure : failures) remark("not compared: " + failure);
   if (flags.report.is_wanted()) flags.report.write(torsio::watch_report(joints));
   if (!failures.empty())
@@ -195,10 +195,7 @@ void add_fleet(CLI::App& app) {
   part->footer("Example: torsio fleet watch today.yaml --store robot.sqlite");
   part->add_option("LIST", watching->list,
                    "joints with their recordings of today; without it, the history is ranked");
-  part->add_option("--store", watching->store, "SQLite file or postgresql:// URL of the registry")
-      ->required();
-  part->add_option("--json", watching->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  watching->store.add(*part, "write the result as JSON to a file, or - for standard output");
   watching->report.add(*part);
   part->callback([watching] { watch(*watching); });
 }
