@@ -186,9 +186,11 @@ class CalibrationStudy::Plan {
         });
     joint.chosen = chosen->name;
     joint.test_rmse = chosen->test_rmse;
-    ModelFile model = joint.chosen == kOwnFit ? std::move(own)
-                      : joint.chosen == kBase ? *base
-                                              : best->file;
+    ModelFile model = std::move(own);
+    if (joint.chosen == kBase)
+      model = *base;
+    else if (joint.chosen != kOwnFit)
+      model = best->file;
     model.card.device_serial = of.serial;
     model.card.held_out = "the test recordings of its joint";
     model.card.metrics = {{"rmse", joint.test_rmse}};

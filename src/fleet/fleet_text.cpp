@@ -311,7 +311,7 @@ ReportDocument fleet_report(const FleetCalibration& fleet) {
         .text = tails_text(type) + ".",
         .tables = {report_table(traits_table(fleet, type))}};
     for (const JointTrait trait : kAllJointTraits)
-      section.figures.push_back(trait_figure(fleet, type, trait, fleet.joints.size()));
+      section.figures.emplace_back(trait_figure(fleet, type, trait, fleet.joints.size()));
     document.sections.push_back(std::move(section));
   }
   document.sections.push_back(
@@ -349,7 +349,7 @@ ReportDocument fleet_joint_report(const FleetCalibration& fleet, std::size_t joi
   for (const FleetCalibration::OfType& type : fleet.types)
     if (type.type == of.type && std::isfinite(of.traits.rmse))
       for (const JointTrait trait : kAllJointTraits)
-        section.figures.push_back(trait_figure(fleet, type, trait, joint));
+        section.figures.emplace_back(trait_figure(fleet, type, trait, joint));
   document.sections.push_back(std::move(section));
   if (!of.warnings.empty()) {
     ReportTable warnings{.headings = {"warnings of the checks"}, .rows = {}, .is_words = true};

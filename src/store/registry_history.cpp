@@ -159,7 +159,7 @@ void Registry::add_drift(const DriftEntry& entry) {
         {entry.device, entry.model, entry.recording, entry.verdict, number(entry.rmse),
          number(entry.bias), number(entry.stiffness), number(entry.stiffness_error),
          number(entry.friction), number(entry.friction_error), number(entry.zero),
-         number(entry.zero_error), number(entry.temperature_C), entry.details, request});
+         number(entry.zero_error), number(entry.temperature_degC), entry.details, request});
     transaction.commit();
   });
 }

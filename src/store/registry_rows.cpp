@@ -99,7 +99,7 @@ DriftEntry drift_from(const RowReader& row) {
           .friction_error = row.real(11),
           .zero = row.real(12),
           .zero_error = row.real(13),
-          .temperature_C = row.real(14),
+          .temperature_degC = row.real(14),
           .details = row.text(15)};
 }
 

@@ -68,7 +68,7 @@ std::string drift_rows_text(std::span<const torsio::DriftEntry> history) {
                short_number(each.rmse), short_number(each.bias),
                percent_text(each.stiffness, each.stiffness_error),
                percent_text(each.friction, each.friction_error),
-               change_text(each.zero, each.zero_error), short_number(each.temperature_C),
+               change_text(each.zero, each.zero_error), short_number(each.temperature_degC),
                short_hash(each.recording)});
   return table.text();
 }
@@ -95,7 +95,7 @@ Json json_of_drift(const torsio::DriftEntry& entry) {
           {"friction_error", entry.friction_error},
           {"zero", entry.zero},
           {"zero_error", entry.zero_error},
-          {"temperature_C", entry.temperature_C},
+          {"temperature_degC", entry.temperature_degC},
           {"details", std::move(details)}};
 }
 

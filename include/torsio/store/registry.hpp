@@ -102,7 +102,7 @@ struct DriftEntry {
   double friction_error = kNotMeasured;
   double zero = kNotMeasured;  ///< change, in the unit of the target
   double zero_error = kNotMeasured;
-  double temperature_C = kNotMeasured;
+  double temperature_degC = kNotMeasured;
   std::string details = {};  ///< JSON
 };
 
