@@ -198,7 +198,7 @@ void add_store_change(CLI::App& store, bool is_promotion) {
 std::string person_here() {
   std::array<char, 256> host{};
   if (gethostname(host.data(), host.size() - 1) != 0) host[0] = '\0';
-  const passwd* const user = getpwuid(geteuid());
+  const passwd* const user = getpwuid(geteuid());  // NOLINT(concurrency-mt-unsafe): one thread
   return fmt::format("{}@{}", user == nullptr ? "user" : user->pw_name,
                      host[0] == '\0' ? "machine" : host.data());
 }

@@ -21,14 +21,14 @@ constexpr double kShortestStep_s = 1.01 / 20e3;
 constexpr double kLongestStep_s = 0.99;
 constexpr double kUsualRate_Hz = 300.0;
 
-constexpr int kLargestCounter_bits = 32;
+constexpr int kMaxCounterBits = 32;
 
 /// The bits of a counter of these stamps that begins again; 0: none does.
 int bits_of_counter(const std::vector<double>& stamps) {
   constexpr double kNear = 2.0;  // usual steps
   double back = 0.0;
   for (std::size_t i = 1; i < stamps.size(); ++i) back = std::max(back, stamps[i - 1] - stamps[i]);
-  if (back > std::exp2(kLargestCounter_bits - 1)) return kLargestCounter_bits;
+  if (back > std::exp2(kMaxCounterBits - 1)) return kMaxCounterBits;
   const double step = usual_step(stamps);
   const auto [lowest, highest] = std::ranges::minmax(stamps);
   for (const int bits : {16, 24, 31}) {
