@@ -43,7 +43,7 @@ void require_serial(std::string_view serial, const std::string& place) {
 
 /// A file that is given to a registry has to be one of the device. @throws Error
 ModelFile parse_model_of(const NewModel& model) {
-  const ModelFile parsed = parse_model(std::as_bytes(std::span(model.bytes)), model.file);
+  ModelFile parsed = parse_model(std::as_bytes(std::span(model.bytes)), model.file);
   const std::string& found = parsed.card.device_serial;
   if (found == model.device) return parsed;
   if (found.empty())
