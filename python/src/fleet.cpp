@@ -1,4 +1,3 @@
-#include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -6,6 +5,7 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "files/json_text.hpp"
 #include "fleet/calibration.hpp"
 #include "fleet/fleet_text.hpp"
 #include "fleet/study_kinds.hpp"
@@ -22,10 +22,6 @@ namespace torsio::python {
 namespace {
 
 using FleetJson = nlohmann::ordered_json;
-
-FleetJson number_or_null(double value) {
-  return std::isfinite(value) ? FleetJson(value) : FleetJson();
-}
 
 StoredStudy stored(StudyStore& store, const std::string& name) {
   if (const auto study = store.find_study(name)) return *study;
@@ -64,8 +60,8 @@ std::string study_trials(const std::string& address, const std::string& name) {
                     {"state", torsio::name(record.state)},
                     {"attempts", record.attempt},
                     {"worker", record.worker},
-                    {"value", number_or_null(record.result.value)},
-                    {"seconds", number_or_null(record.result.seconds)},
+                    {"value", json_number(record.result.value)},
+                    {"seconds", json_number(record.result.seconds)},
                     {"reason", record.result.reason}});
   return list.dump();
 }
@@ -182,7 +178,7 @@ std::string registry_models(const std::string& address, const std::string& seria
         {"added_by", of.added_by}, {"note", of.note},     {"torsio_version", of.torsio_version}};
     if (of.parent) json["parent"] = *of.parent;
     if (const auto rmse = of.metrics.find("rmse"); rmse != of.metrics.end())
-      json["rmse"] = number_or_null(rmse->second);
+      json["rmse"] = json_number(rmse->second);
     list.push_back(std::move(json));
   }
   return list.dump();
@@ -196,13 +192,13 @@ std::string registry_drift(const std::string& address, const std::string& serial
                     {"model", of.model},
                     {"recording", of.recording},
                     {"verdict", of.verdict},
-                    {"rmse", number_or_null(of.rmse)},
-                    {"stiffness", number_or_null(of.stiffness)},
-                    {"stiffness_error", number_or_null(of.stiffness_error)},
-                    {"friction", number_or_null(of.friction)},
-                    {"friction_error", number_or_null(of.friction_error)},
-                    {"zero", number_or_null(of.zero)},
-                    {"zero_error", number_or_null(of.zero_error)}});
+                    {"rmse", json_number(of.rmse)},
+                    {"stiffness", json_number(of.stiffness)},
+                    {"stiffness_error", json_number(of.stiffness_error)},
+                    {"friction", json_number(of.friction)},
+                    {"friction_error", json_number(of.friction_error)},
+                    {"zero", json_number(of.zero)},
+                    {"zero_error", json_number(of.zero_error)}});
   return list.dump();
 }
 

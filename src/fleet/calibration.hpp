@@ -14,6 +14,7 @@
 #include "fleet/outliers.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
+#include "torsio/data/load.hpp"
 #include "torsio/search/study_kind.hpp"
 #include "torsio/store/study_store.hpp"
 
@@ -50,6 +51,9 @@ struct CalibrationRequest {
   std::uint64_t seed = 1;
   bool only_compares = false;  ///< no models are made: the test at the end of a production line
 };
+
+/// How the recordings of a request are read.
+[[nodiscard]] LoadOptions load_options(const CalibrationRequest& request, const Progress& progress);
 
 /// Reads a list of joints (docs/fleet.md); paths are relative to the list.
 /// @throws Error naming file, line, what was expected and found.

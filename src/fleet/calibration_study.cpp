@@ -129,12 +129,7 @@ class CalibrationStudy::Plan {
   [[nodiscard]] Dataset recordings_of(const FleetJoint& joint, const Progress& progress) const {
     if (request_.simulated)
       return production_recordings(joint.serial, fault_of(joint.serial), request_.seed, progress);
-    LoadOptions options;
-    options.progress = progress;
-    if (!request_.mapping.empty()) options.mapping = request_.mapping;
-    if (request_.rate_Hz > 0.0) options.rate_Hz = request_.rate_Hz;
-    options.target = request_.target;
-    Dataset dataset = load_dataset(joint.train, joint.test, options);
+    Dataset dataset = load_dataset(joint.train, joint.test, load_options(request_, progress));
     if (!dataset.has_role(Role::test)) dataset = with_held_out(std::move(dataset), Role::test);
     dataset.check();
     return dataset;
@@ -258,6 +253,15 @@ CalibrationStudy::~CalibrationStudy() = default;
 std::vector<Trial> CalibrationStudy::first_trials() const { return plan_->first_trials(); }
 TrialResult CalibrationStudy::run(const Claim& claim, const Progress& progress) {
   return plan_->run(claim, progress);
+}
+
+LoadOptions load_options(const CalibrationRequest& request, const Progress& progress) {
+  LoadOptions options;
+  options.progress = progress;
+  if (!request.mapping.empty()) options.mapping = request.mapping;
+  if (request.rate_Hz > 0.0) options.rate_Hz = request.rate_Hz;
+  options.target = request.target;
+  return options;
 }
 
 StoredStudy begin_calibration(StudyStore& store, const std::string& name,

@@ -1,11 +1,11 @@
 #include "fleet/calibration_text.hpp"
 
-#include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "data/byte_source.hpp"
+#include "files/json_text.hpp"
+#include "search/stored_path.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -19,14 +19,6 @@ using FleetJson = nlohmann::ordered_json;
                .advice = "Use the torsio that began it."});
 }
 
-std::string absolute_path(const std::string& path) {
-  // A mapping that comes with torsio has a name, not a path.
-  return path.empty() || !std::filesystem::exists(path)
-             ? path
-             : std::filesystem::absolute(path).lexically_normal().string();
-}
-
-FleetJson number(double value) { return std::isfinite(value) ? FleetJson(value) : FleetJson(); }
 double number_from(const FleetJson& json) {
   return json.is_null() ? kNotMeasured : json.get<double>();
 }
@@ -34,7 +26,7 @@ double number_from(const FleetJson& json) {
 FleetJson files_json(const std::vector<std::string>& files) {
   FleetJson json = FleetJson::array();
   for (const std::string& file : files)
-    json.push_back({{"file", absolute_path(file)}, {"sha256", sha256_of_file(file)}});
+    json.push_back({{"file", stored_path(file)}, {"sha256", sha256_of_file(file)}});
   return json;
 }
 
@@ -52,12 +44,13 @@ FleetJson traits_json(const JointTraits& traits) {
   FleetJson json;
   for (const JointTrait trait : kAllJointTraits) {
     const JointTraits::Value& of = traits[trait];
-    json[std::string(name(trait))] = {
-        {"value", number(of.value)}, {"std_error", number(of.std_error)}, {"unit", of.unit}};
+    json[std::string(name(trait))] = {{"value", json_number(of.value)},
+                                      {"std_error", json_number(of.std_error)},
+                                      {"unit", of.unit}};
   }
   json["encoder"] = traits.encoder;
   json["encoder_periods"] = traits.encoder_periods;
-  json["rmse"] = number(traits.rmse);
+  json["rmse"] = json_number(traits.rmse);
   return json;
 }
 
@@ -100,12 +93,12 @@ JointTask task_from_text(std::string_view text) {
 }
 
 std::string calibration_text(const CalibrationRequest& request) {
-  FleetJson json{{"mapping", absolute_path(request.mapping)},
+  FleetJson json{{"mapping", stored_path(request.mapping)},
                  {"rate_Hz", request.rate_Hz},
                  {"target", request.target},
                  {"inputs", request.inputs},
                  {"model", request.model},
-                 {"base", absolute_path(request.base)},
+                 {"base", stored_path(request.base)},
                  {"base_sha256", request.base.empty() ? "" : sha256_of_file(request.base)},
                  {"seed", request.seed},
                  {"only_compares", request.only_compares}};
@@ -150,8 +143,8 @@ std::string joint_text(const CalibratedJoint& joint) {
   FleetJson methods = FleetJson::array();
   for (const CalibratedJoint::Method& of : joint.methods)
     methods.push_back({{"name", of.name},
-                       {"held_out_rmse", number(of.held_out_rmse)},
-                       {"test_rmse", number(of.test_rmse)}});
+                       {"held_out_rmse", json_number(of.held_out_rmse)},
+                       {"test_rmse", json_number(of.test_rmse)}});
   return FleetJson{{"serial", joint.serial},
                    {"type", joint.type},
                    {"fault", joint.fault},
@@ -161,7 +154,7 @@ std::string joint_text(const CalibratedJoint& joint) {
                    {"traits", traits_json(joint.traits)},
                    {"methods", std::move(methods)},
                    {"chosen", joint.chosen},
-                   {"test_rmse", number(joint.test_rmse)}}
+                   {"test_rmse", json_number(joint.test_rmse)}}
       .dump();
 }
 

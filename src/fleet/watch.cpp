@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <utility>
@@ -12,15 +11,20 @@
 #include "data/byte_source.hpp"
 #include "evaluate/drift/verdicts.hpp"
 #include "files/json_text.hpp"
+#include "search/stored_path.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/load.hpp"
 
 namespace torsio {
 namespace {
 
 using WatchJson = nlohmann::ordered_json;
 
-ModelFile current_model(Registry& registry, const std::string& serial) {
+struct CurrentModel {
+  std::int64_t id = 0;
+  ModelFile file;
+};
+
+CurrentModel current_model(Registry& registry, const std::string& serial) {
   const std::optional<RegisteredModel> current = registry.current(serial);
   if (!current)
     throw Error({.place = "device " + serial,
@@ -28,7 +32,7 @@ ModelFile current_model(Registry& registry, const std::string& serial) {
                  .advice = "Calibrate it (torsio fleet calibrate --promote), or promote one of its "
                            "models (torsio store promote)."});
   const std::string bytes = registry.model_bytes(serial, current->id);
-  return parse_model(std::as_bytes(std::span(bytes)), current->file, serial);
+  return {current->id, parse_model(std::as_bytes(std::span(bytes)), current->file, serial)};
 }
 
 double half_width(const DriftQuantity& of) { return 0.5 * (of.highest - of.lowest); }
@@ -108,9 +112,8 @@ std::vector<RecordingUse> add_recordings(Registry& registry, const CalibrationRe
   const auto add = [&](const std::vector<std::string>& files, Role role) {
     for (const std::string& file : files) {
       uses.push_back({.sha256 = sha256_of_file(file), .role = std::string(name(role))});
-      registry.add_recording({.sha256 = uses.back().sha256,
-                              .device = serial,
-                              .file = std::filesystem::absolute(file).lexically_normal().string()});
+      registry.add_recording(
+          {.sha256 = uses.back().sha256, .device = serial, .file = stored_path(file)});
     }
   };
   add(joint->train, Role::train);
@@ -122,28 +125,23 @@ std::vector<RecordingUse> add_recordings(Registry& registry, const CalibrationRe
 
 void watch_joint(Registry& registry, const FleetJoint& joint, const CalibrationRequest& request,
                  const Progress& progress) {
-  const ModelFile model = current_model(registry, joint.serial);
-  LoadOptions options;
-  options.progress = progress;
-  if (!request.mapping.empty()) options.mapping = request.mapping;
-  if (request.rate_Hz > 0.0) options.rate_Hz = request.rate_Hz;
-  options.target = request.target.empty() ? model.settings.target : request.target;
+  const auto [id, model] = current_model(registry, joint.serial);
+  LoadOptions options = load_options(request, progress);
+  if (options.target.empty()) options.target = model.settings.target;
   options.default_mapping = model.card.mapping;
   options.default_mapping_place = "the model of " + joint.serial;
   std::vector<std::string> files = joint.train;
   files.insert(files.end(), joint.test.begin(), joint.test.end());
   const Dataset dataset = load_dataset({}, files, options);
   for (const DatasetRecord& record : dataset.records)
-    registry.add_recording(
-        {.sha256 = record.recording.source.sha256,
-         .device = joint.serial,
-         .file =
-             std::filesystem::absolute(record.recording.source.file).lexically_normal().string(),
-         .samples = record.recording.size(),
-         .rate_Hz = record.recording.sample_rate_Hz()});
+    registry.add_recording({.sha256 = record.recording.source.sha256,
+                            .device = joint.serial,
+                            .file = stored_path(record.recording.source.file),
+                            .samples = record.recording.size(),
+                            .rate_Hz = record.recording.sample_rate_Hz()});
   DriftEntry entry = entry_of(detect_drift(model, dataset, {}, progress));
   entry.device = joint.serial;
-  entry.model = registry.current(joint.serial)->id;
+  entry.model = id;
   entry.recording = dataset.records.front().recording.source.sha256;
   registry.add_drift(entry);
 }

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "data/load_roles.hpp"
+#include "search/stored_path.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/common/load_target.hpp"
@@ -18,28 +18,21 @@ namespace {
 
 using RequestJson = nlohmann::ordered_json;
 
-std::string absolute(const std::string& path) {
-  // A mapping that comes with torsio has a name, not a path.
-  return path.empty() || !std::filesystem::exists(path)
-             ? path
-             : std::filesystem::absolute(path).lexically_normal().string();
-}
-
-std::vector<std::string> absolute(const std::vector<std::string>& paths) {
+std::vector<std::string> stored_paths(const std::vector<std::string>& paths) {
   std::vector<std::string> result;
   result.reserve(paths.size());
-  for (const std::string& path : paths) result.push_back(absolute(path));
+  for (const std::string& path : paths) result.push_back(stored_path(path));
   return result;
 }
 
 RequestJson request_json(const SearchRequest& request) {
-  return {{"recordings", absolute(request.recordings)},
-          {"validation", absolute(request.validation)},
-          {"mapping", absolute(request.mapping)},
+  return {{"recordings", stored_paths(request.recordings)},
+          {"validation", stored_paths(request.validation)},
+          {"mapping", stored_path(request.mapping)},
           {"joint", request.joint},
           {"rate_Hz", request.rate_Hz},
           {"target", request.target},
-          {"load_file", absolute(request.load_file)},
+          {"load_file", stored_path(request.load_file)},
           {"inputs", request.inputs},
           {"initialise", request.initialise},
           {"models", request.models},
@@ -76,7 +69,7 @@ RequestJson data_json(const Dataset& dataset) {
     RequestJson roles = RequestJson::array();
     for (const Segment& segment : record.segments)
       roles.push_back({segment.begin, segment.end, name(segment.role)});
-    data.push_back({{"file", absolute(record.recording.source.file)},
+    data.push_back({{"file", stored_path(record.recording.source.file)},
                     {"sha256", record.recording.source.sha256},
                     {"mapping", record.recording.mapping},
                     {"roles", std::move(roles)}});
