@@ -13,6 +13,12 @@ endfunction()
 
 file(REMOVE_RECURSE ${WORK})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
+# The program needs no other part to be built.
+run(${CMAKE_COMMAND} --install ${BUILD} --component program --prefix ${WORK}/program)
+run(${WORK}/program/bin/torsio --version)
+if(EXISTS ${WORK}/program/lib OR EXISTS ${WORK}/program/include)
+  message(FATAL_ERROR "the component program contains libraries")
+endif()
 run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE} -B ${WORK}/build -DCMAKE_PREFIX_PATH=${WORK}/prefix)
 run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_of_the_lab -B ${WORK}/build_lab -DCMAKE_PREFIX_PATH=${WORK}/prefix)
