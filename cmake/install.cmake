@@ -29,11 +29,11 @@ if(TORSIO_BUILD_LAB)
     install(DIRECTORY ${PROJECT_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program
             FILES_MATCHING PATTERN "*.1")
   endif()
-  install(TARGETS torsio_data torsio_learn torsio_bench torsio_trials torsio_export torsio_store torsio_search torsio_fleet EXPORT torsioLearnTargets FILE_SET HEADERS
-          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS torsio_data torsio_learn torsio_bench torsio_trials torsio_export torsio_store torsio_search
+          EXPORT torsioLearnTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT torsioLearnTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
-  install(TARGETS torsio_report torsio_design torsio_coupling torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS
-          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS torsio_report torsio_fleet torsio_design torsio_coupling torsio_lab
+          EXPORT torsioLabTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT torsioLabTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
   install(FILES cmake/Findlz4.cmake cmake/Findcairo.cmake DESTINATION ${torsio_package_dir})
 endif()
