@@ -21,8 +21,8 @@ torsio::JointSample read_joint(int tick) {
 
 int run(const char* model_file) {
   // readme-begin
-  torsio::TorqueEstimator estimator(
-      torsio::load_estimator(model_file));  // may throw: call it before the loop
+  // Filters for the rate of this loop. May throw: call it before the loop.
+  torsio::TorqueEstimator estimator(torsio::load_estimator(model_file, {.rate_Hz = 1000}));
   // If the mapping of the training data subtracts a zero: estimator.set_zero("gear_angle_rad", rest_rad);
   const torsio::DenormalsOff denormals_off;  // once per real-time thread
   estimator.reset();

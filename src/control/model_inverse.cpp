@@ -144,7 +144,7 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
     if (follows_answer_) asked_.front() = answer.value;
     is_asked_ = true;
   }
-  if (!core_.unset_zeros().empty() && answer.fault != Fault::warming_up)
+  if (!core_.unset_zeros().empty() && answer.fault != Fault::wrong_rate)
     answer.fault = Fault::zero_not_set;
   // The model's deflection lies off the measured one by the zeros of its channels.
   answer.value += zero_rad_;

@@ -156,7 +156,7 @@ void BranchingEstimator::settle(std::span<double> record, std::span<const double
   Estimate estimate;
   for (double time_s = 0.0; !(time_s > longest_s); time_s += period_s_) {
     estimate = estimator.step(raw);
-    if (has_settled(estimate.fault)) break;
+    if (estimator.is_settled() && has_settled(estimate.fault)) break;
   }
   std::ranges::fill(record.first(kPlaces), 0.0);
   (void)estimator.save(state_before(record, state_bytes_));

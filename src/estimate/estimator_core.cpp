@@ -345,8 +345,9 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
   }
   out.novelty = raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
-    // With an unknown zero, the range of a channel cannot be checked.
-    out.fault = is_settled() ? Fault::zero_not_set : Fault::warming_up;
+    // With an unknown zero, the range of a channel cannot be checked. A warm-up ends by itself, the want of a
+    // zero does not: it is reported from the first tick on.
+    if (!is_wrong_rate_) out.fault = Fault::zero_not_set;
     out.std_dev = kNotMeasured;
   }
   last_value_ = out.value;

@@ -178,7 +178,7 @@ $BODY$}
     std::string zeros;
     if (has_zeros_)
       zeros = R"c(  if (@has_unset_zeros(s)) {
-    out.fault = @is_settled(s) ? @ZERO_NOT_SET : @WARMING_UP;
+    if (!s->is_wrong_rate) out.fault = @ZERO_NOT_SET;
     out.std_dev = @not_a_number();
   }
 )c";

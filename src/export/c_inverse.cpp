@@ -197,7 +197,7 @@ $STORED$$ZEROS$  of->wanted_rad += of->zero_rad;
                             : ""},
        {"ZEROS",
         has_zeros
-            ? "  if (@has_unset_zeros(m) && of->fault != @WARMING_UP) of->fault = @ZERO_NOT_SET;\n"
+            ? "  if (@has_unset_zeros(m) && of->fault != @WRONG_RATE) of->fault = @ZERO_NOT_SET;\n"
             : ""}});
 }
 

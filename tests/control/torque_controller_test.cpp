@@ -110,6 +110,7 @@ TEST(ModelInverse, CountsInTheZerosOfItsChannels) {
   EstimatorSettings settings = deflection_and_rate();
   settings.zeroed_channels = {"joint_angle_rad"};
   ModelInverse inverse(settings, test::example<Linear>());
+  EXPECT_EQ(inverse.step(12.5, wound(0.01)).fault, Fault::zero_not_set) << "while it warms up";
   EXPECT_EQ(settled(inverse, 12.5, wound(0.01)).fault, Fault::zero_not_set);
   inverse.set_zero("joint_angle_rad", -0.03);
   const Estimate found = settled(inverse, 12.5, wound(-0.02));

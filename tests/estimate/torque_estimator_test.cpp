@@ -20,11 +20,12 @@ namespace {
 using test::kNaN;
 using testing::HasSubstr;
 
-Estimator estimator(const FeatureSpec& features, const std::string& target = "torque_Nm") {
+Estimator estimator(const FeatureSpec& features, const std::string& target = "torque_Nm",
+                    const std::vector<std::string>& zeroed_channels = {}) {
   return {{.features = features,
            .sample_rate_Hz = 1000.0,
            .target = target,
-           .zeroed_channels = {},
+           .zeroed_channels = zeroed_channels,
            .ranges = {.lowest = {-1.0, -1.0}, .highest = {1.0, 1.0}},
            .fallback = {.intercept = 0.0, .slope = {0.0, 0.0}},
            .residuals = {}},
@@ -103,6 +104,17 @@ TEST(TorqueEstimator, ReportsALoopThatDoesNotRunAtItsSampleRate) {
     EXPECT_EQ(faults.back(), Fault::wrong_rate) << period_s;
     EXPECT_EQ(std::ranges::count(std::span(faults).first(17), Fault::wrong_rate), 0)
         << "no verdict before more than 16 periods";
+  }
+}
+
+// At a wrong rate the filters start again in each tick: they never settle, and must not hide the cause.
+TEST(TorqueEstimator, ReportsTheCausesThatAPersonHasToRemoveAndNotTheWarmUp) {
+  for (const double period_s : {1e-2, 1e-4}) {
+    const std::vector<Fault> faults = faults_at(
+        TorqueEstimator(estimator(kFiltered, "torque_Nm", {"joint_angle_rad"})), period_s);
+    EXPECT_EQ(faults.front(), Fault::zero_not_set) << period_s;
+    EXPECT_EQ(faults.back(), Fault::wrong_rate) << period_s;
+    EXPECT_EQ(std::ranges::count(faults, Fault::warming_up), 0) << period_s;
   }
 }
 

@@ -107,6 +107,20 @@ TYPED_TEST(C99, HasTheWholeLanguageOfItsFeatures) {
                1e-6);
 }
 
+TEST(C99Guards, ReportAMissingZeroFromTheFirstTickOn) {
+  ModelFile file = remembering(any_example<Linear>());
+  file.settings.zeroed_channels = {"gear_angle_rad"};
+  BasicEstimator<AnyModel> own(file.settings, AnyModel(file.parameters));
+  const TemporaryFolder folder;
+  ExportedProgram exported(folder, file, {.name = "joint", .real = CReal::twofold},
+                           own.raw_inputs(), /*sets_zeros=*/false);
+  for (int n = 0; n < 100; ++n) {
+    const std::vector<double> raw(own.raw_inputs().size(), 1e-4 * n);
+    ASSERT_EQ(own.step(raw).fault, Fault::zero_not_set) << n;
+    ASSERT_EQ(exported.step(raw).fault, Fault::zero_not_set) << n;
+  }
+}
+
 TYPED_TEST(C99, TakesCountsOfEncoders) {
   expect_equal(guarded(any_example<TypeParam>()),
                {.name = "joint",

@@ -19,9 +19,9 @@ class ExportedProgram {
  public:
   /// @param inputs of the model; those of `options.counts` are given as counts
   ExportedProgram(const TemporaryFolder& folder, const ModelFile& model, const C99Options& options,
-                  const std::vector<std::string>& inputs)
+                  const std::vector<std::string>& inputs, bool sets_zeros = true)
       : library_(folder, c99_program(model, options, "test.safetensors"), options.name,
-                 wrapper(options, model, inputs)) {
+                 wrapper(options, model, inputs, sets_zeros)) {
     step_ = library_.symbol<Step>("around_step");
     self_test_ = library_.symbol<SelfTest>("around_self_test");
   }
@@ -44,7 +44,7 @@ class ExportedProgram {
   using SelfTest = double (*)();
 
   static std::string wrapper(const C99Options& options, const ModelFile& model,
-                             const std::vector<std::string>& inputs) {
+                             const std::vector<std::string>& inputs, bool sets_zeros) {
     const std::string real = options.real == CReal::single ? "float" : "double";
     std::string arguments;
     for (std::size_t i = 0; i < inputs.size(); ++i) {
@@ -55,8 +55,9 @@ class ExportedProgram {
     }
     std::string zeros;
     for (const std::string& channel : model.settings.zeroed_channels)
-      zeros +=
-          fmt::format("  if (!is_ready) {0}_set_zero_{1}(&state, 0);\n", options.name, channel);
+      if (sets_zeros)
+        zeros +=
+            fmt::format("  if (!is_ready) {0}_set_zero_{1}(&state, 0);\n", options.name, channel);
     return fmt::format(R"c(#include "{0}.h"
 static {0}_state state;
 static int is_ready;
