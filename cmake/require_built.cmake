@@ -2,7 +2,7 @@
 # midst, with nothing but the path of a library.
 set(torsio_parts torsio_runtime)
 if(TORSIO_BUILD_LAB)
-  list(APPEND torsio_parts torsio_lab torsio_program)
+  list(APPEND torsio_parts torsio_coupling torsio_export torsio_fleet torsio_program)
 endif()
 if(TORSIO_BUILD_C)
   list(APPEND torsio_parts torsio_c)

@@ -13,7 +13,7 @@ endfunction()
 
 file(REMOVE_RECURSE ${WORK})
 execute_process(COMMAND ${CMAKE_COMMAND} -G Ninja -S ${SOURCE} -B ${WORK}/build OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
-foreach(part torsio_runtime torsio_lab torsio_program)
+foreach(part torsio_runtime torsio_coupling torsio_export torsio_fleet torsio_program)
   file(WRITE ${WORK}/build/built/${part} "")
 endforeach()
 
