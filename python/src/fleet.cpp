@@ -8,11 +8,11 @@
 #include "files/json_text.hpp"
 #include "fleet/calibration.hpp"
 #include "fleet/fleet_text.hpp"
+#include "fleet/registration.hpp"
 #include "fleet/study_kinds.hpp"
 #include "fleet/watch.hpp"
 #include "fleet/watch_text.hpp"
 #include "report/cross_validation.hpp"
-#include "search/specimen_study.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/search/structure_study.hpp"
 #include "torsio/search/workers.hpp"
@@ -95,56 +95,29 @@ std::string study_search(const SearchRequest& request, const std::string& addres
   });
 }
 
-struct FleetCall {
-  std::string list;
-  std::string specimens;
-  std::size_t faults = 0;
-  std::string base;
-  std::string model;
-  std::uint64_t seed = 1;
-};
-
-CalibrationRequest request_of(const FleetCall& call) {
-  CalibrationRequest request;
-  if (!call.list.empty()) {
-    request = read_fleet_list(call.list);
-  } else {
-    const SpecimenRequest range = specimen_range(call.specimens);
-    request.simulated = {.actuator = range.actuator,
-                         .first = range.first,
-                         .last = range.last,
-                         .faults = call.faults};
-  }
-  if (!call.base.empty()) request.base = call.base;
-  if (!call.model.empty()) request.model = call.model;
-  request.seed = call.seed;
-  return request;
-}
-
 /// As `torsio fleet calibrate`.
-std::string calibrate_fleet(const FleetCall& call, const std::string& address,
+std::string calibrate_fleet(const FleetChoice& choice, const std::string& address,
                             const std::string& name, bool promotes, std::size_t threads) {
   return interruptible([&](const Progress& progress) {
-    const CalibrationRequest request = request_of(call);
-    CalibrationStudy kind(request);
+    CalibrationStudy kind(calibration_request(choice));
     StudyStore store(address.empty() ? StoreAddress{} : store_address(address));
-    const StoredStudy study = begin_calibration(store, name, request, kind);
+    const StoredStudy study = begin_calibration(store, name, kind);
     run_workers(store, study, kind, {.threads = threads}, progress);
     const FleetCalibration fleet = calibration_result(store, study);
     if (!address.empty()) {
       Registry registry(store.address());
-      static_cast<void>(register_fleet(registry, store, fleet, request, promotes, "Python"));
+      static_cast<void>(register_fleet(registry, store, fleet, kind.request(), promotes, "Python"));
     }
     return fleet_json(fleet);
   });
 }
 
 /// As `torsio fleet watch`.
-std::string watch_fleet(const std::string& list, const std::string& address) {
+std::string watch_fleet(const std::string& list, const std::string& address, std::size_t threads) {
   return interruptible([&](const Progress& progress) {
     Registry registry(store_address(address));
     std::vector<std::string> failures;
-    if (!list.empty()) failures = watch_joints(registry, read_fleet_list(list), progress);
+    if (!list.empty()) failures = watch_joints(registry, read_fleet_list(list), threads, progress);
     return watch_json(rank_by_drift(registry), failures);
   });
 }
@@ -172,11 +145,13 @@ std::string registry_models(const std::string& address, const std::string& seria
   Registry registry(store_address(address));
   FleetJson list = FleetJson::array();
   for (const RegisteredModel& of : registry.models(serial)) {
-    FleetJson json{
-        {"model", of.id},          {"serial", of.device}, {"family", of.family},
-        {"sha256", of.sha256},     {"parent", nullptr},   {"rmse", nullptr},
-        {"added_by", of.added_by}, {"note", of.note},     {"torsio_version", of.torsio_version}};
+    FleetJson json{{"model", of.id},      {"serial", of.device},
+                   {"family", of.family}, {"sha256", of.sha256},
+                   {"parent", nullptr},   {"base_sha256", nullptr},
+                   {"rmse", nullptr},     {"added_by", of.added_by},
+                   {"note", of.note},     {"torsio_version", of.torsio_version}};
     if (of.parent) json["parent"] = *of.parent;
+    if (!of.base_sha256.empty()) json["base_sha256"] = of.base_sha256;
     if (const auto rmse = of.metrics.find("rmse"); rmse != of.metrics.end())
       json["rmse"] = json_number(rmse->second);
     list.push_back(std::move(json));
@@ -251,12 +226,17 @@ void bind_fleet(py::module_& module) {
       [](const std::string& list, const std::string& specimens, std::size_t faults,
          const std::string& base, const std::string& model, std::uint64_t seed,
          const std::string& store, const std::string& study, bool promote, std::size_t threads) {
-        return calibrate_fleet({list, specimens, faults, base, model, seed}, store, study, promote,
-                               threads);
+        return calibrate_fleet({.list = list,
+                                .specimens = specimens,
+                                .faults = faults,
+                                .base = base,
+                                .model = model,
+                                .seed = seed},
+                               store, study, promote, threads);
       },
       py::arg("list"), py::arg("specimens"), py::arg("faults"), py::arg("base"), py::arg("model"),
       py::arg("seed"), py::arg("store"), py::arg("study"), py::arg("promote"), py::arg("threads"));
-  module.def("watch_fleet", &watch_fleet, py::arg("list"), py::arg("store"));
+  module.def("watch_fleet", &watch_fleet, py::arg("list"), py::arg("store"), py::arg("threads"));
   module.def("registry_devices", &registry_devices, py::arg("store"));
   module.def("registry_models", &registry_models, py::arg("store"), py::arg("serial"));
   module.def("registry_drift", &registry_drift, py::arg("store"), py::arg("serial"));

@@ -216,13 +216,13 @@ def calibrate_fleet(
     return Fleet(_document(text))
 
 
-def watch_fleet(store: Path, joints: Path = "", *, progress: Listener | None = None) -> Any:
+def watch_fleet(store: Path, joints: Path = "", *, threads: int = 0, progress: Listener | None = None) -> Any:
     """A DataFrame of the joints of a registry, the largest drift first, as `torsio fleet watch`.
 
-    joints: list with recordings of today, which are compared first.
+    joints: list with recordings of today, which are compared first. threads: 0 for one for each core.
     """
     with shown(progress):
-        document = json.loads(_core.watch_fleet(fspath(joints), _store(store)))
+        document = json.loads(_core.watch_fleet(fspath(joints), _store(store), threads))
     for row in document["joints"]:
         for key in ("severity", "severity_before"):
             row[key] = _number(row[key])

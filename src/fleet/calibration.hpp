@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -46,10 +47,23 @@ struct CalibrationRequest {
   std::vector<std::string> inputs = {};  ///< empty: the default of the recordings
   std::string model = "grey_box";        ///< one entry of `model_choices`
   /// Model file that all joints are compared with and start from; empty: for each type the model of its first
-  /// joint.
+  /// joint whose recordings pass the checks.
   std::string base = {};
   std::uint64_t seed = 1;
   bool only_compares = false;  ///< no models are made: the test at the end of a production line
+  /// SHA-256 of each file, by its path, when the study began; those that are missing are found by `CalibrationStudy`.
+  std::map<std::string, std::string> sha256 = {};
+};
+
+/// A fleet as it is named by a person.
+struct FleetChoice {
+  std::string list;       ///< path of a list of joints, or
+  std::string specimens;  ///< simulated ones: "dfki-50#0001..#1000"
+  std::size_t faults = 0;
+  std::string base;   ///< empty: that of the list
+  std::string model;  ///< empty: the default
+  std::uint64_t seed = 1;
+  bool only_compares = false;
 };
 
 /// How the recordings of a request are read.
@@ -58,6 +72,9 @@ struct CalibrationRequest {
 /// Reads a list of joints (docs/fleet.md); paths are relative to the list.
 /// @throws Error naming file, line, what was expected and found.
 [[nodiscard]] CalibrationRequest read_fleet_list(const std::string& path);
+
+/// @throws UsageError unless there is either a list or specimens; as `read_fleet_list`.
+[[nodiscard]] CalibrationRequest calibration_request(const FleetChoice& choice);
 
 /// What was found about one joint.
 struct CalibratedJoint {
@@ -77,6 +94,8 @@ struct CalibratedJoint {
   std::vector<Method> methods = {};
   std::string chosen = {};          ///< name of the chosen method
   double test_rmse = kNotMeasured;  ///< error of the chosen method
+  /// Hash of the model file that the chosen model was made from; empty: it was fitted to the joint alone.
+  std::string base_sha256 = {};
   std::int64_t trial = 0;
 };
 
@@ -107,12 +126,16 @@ struct FleetCalibration {
 inline constexpr std::string_view kCalibrationStudy = "calibrate";
 
 /// One trial for each joint: the recordings are checked; the joint is compared with the base model; the base is
-/// transferred to it, a model is fitted to it, and the better one on held-out samples is its model.
+/// transferred to it, a model is fitted to it, and the better one on held-out samples is its model. The joint whose
+/// model is the base has that one.
 class CalibrationStudy : public StudyKind {
  public:
+  /// @throws Error if a file cannot be read.
   explicit CalibrationStudy(CalibrationRequest request);
   ~CalibrationStudy() override;
 
+  /// With absolute paths and the hashes of all files.
+  [[nodiscard]] const CalibrationRequest& request() const noexcept;
   [[nodiscard]] std::vector<Trial> first_trials() const;
   [[nodiscard]] TrialResult run(const Claim& claim, const Progress& progress) override;
   [[nodiscard]] HalvingDecision decide(const std::string& /*group*/, int /*step*/,
@@ -125,13 +148,13 @@ class CalibrationStudy : public StudyKind {
   std::unique_ptr<Plan> plan_;
 };
 
-/// The text of a request that is kept in a store, with the hashes of its files.
+/// The text of a request that is kept in a store, with the hashes of its files, which have to be there.
 [[nodiscard]] std::string calibration_text(const CalibrationRequest& request);
-/// Begins or resumes the study of that name. @throws UsageError as `StudyStore::create_or_resume`.
+/// Begins or resumes the study of that name. @throws UsageError as `StudyStore::create_or_resume`, Error if a
+/// recording has changed since it began.
 [[nodiscard]] StoredStudy begin_calibration(StudyStore& store, const std::string& name,
-                                            const CalibrationRequest& request,
                                             const CalibrationStudy& kind);
-/// The study of a store. @throws Error if a recording has changed since it began.
+/// The study of a store. Its trials refuse recordings that have changed since it began.
 [[nodiscard]] std::unique_ptr<CalibrationStudy> calibration_study(const StoredStudy& study);
 
 /// The results of a study and its outliers, of the joints that have finished.

@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "data/byte_source.hpp"
 #include "files/json_text.hpp"
 #include "search/stored_path.hpp"
 #include "torsio/core/error.hpp"
@@ -23,21 +22,35 @@ double number_from(const FleetJson& json) {
   return json.is_null() ? kNotMeasured : json.get<double>();
 }
 
-FleetJson files_json(const std::vector<std::string>& files) {
+FleetJson files_json(const std::vector<std::string>& files, const FileHashes& sha256) {
   FleetJson json = FleetJson::array();
   for (const std::string& file : files)
-    json.push_back({{"file", stored_path(file)}, {"sha256", sha256_of_file(file)}});
+    json.push_back({{"file", file}, {"sha256", sha256.at(file)}});
   return json;
 }
 
-std::vector<std::string> files_from(const FleetJson& json,
-                                    std::map<std::string, std::string>& sha256) {
+std::vector<std::string> files_from(const FleetJson& json, FileHashes& sha256) {
   std::vector<std::string> files;
+  files.reserve(json.size());
   for (const FleetJson& each : json) {
     files.push_back(each.at("file"));
     sha256[files.back()] = each.at("sha256");
   }
   return files;
+}
+
+FleetJson joint_json(const FleetJoint& joint, const FileHashes& sha256) {
+  return {{"serial", joint.serial},
+          {"type", joint.type},
+          {"train", files_json(joint.train, sha256)},
+          {"test", files_json(joint.test, sha256)}};
+}
+
+FleetJoint joint_from(const FleetJson& json, FileHashes& sha256) {
+  return {.serial = json.at("serial"),
+          .type = json.at("type"),
+          .train = files_from(json.at("train"), sha256),
+          .test = files_from(json.at("test"), sha256)};
 }
 
 FleetJson traits_json(const JointTraits& traits) {
@@ -70,23 +83,13 @@ JointTraits traits_from(const FleetJson& json) {
 
 }  // namespace
 
-std::string task_text(const FleetJoint& joint) {
-  return FleetJson{{"serial", joint.serial},
-                   {"type", joint.type},
-                   {"train", files_json(joint.train)},
-                   {"test", files_json(joint.test)}}
-      .dump();
+std::string task_text(const FleetJoint& joint, const FileHashes& sha256) {
+  return joint_json(joint, sha256).dump();
 }
 
-JointTask task_from_text(std::string_view text) {
+FleetJoint task_from_text(std::string_view text, FileHashes& sha256) {
   try {
-    const FleetJson json = FleetJson::parse(text);
-    JointTask task;
-    task.joint.serial = json.at("serial");
-    task.joint.type = json.at("type");
-    task.joint.train = files_from(json.at("train"), task.sha256);
-    task.joint.test = files_from(json.at("test"), task.sha256);
-    return task;
+    return joint_from(FleetJson::parse(text), sha256);
   } catch (const FleetJson::exception&) {
     refuse_text("a joint");
   }
@@ -98,8 +101,8 @@ std::string calibration_text(const CalibrationRequest& request) {
                  {"target", request.target},
                  {"inputs", request.inputs},
                  {"model", request.model},
-                 {"base", stored_path(request.base)},
-                 {"base_sha256", request.base.empty() ? "" : sha256_of_file(request.base)},
+                 {"base", request.base},
+                 {"base_sha256", request.base.empty() ? "" : request.sha256.at(request.base)},
                  {"seed", request.seed},
                  {"only_compares", request.only_compares}};
   if (request.simulated)
@@ -109,7 +112,7 @@ std::string calibration_text(const CalibrationRequest& request) {
                          {"faults", request.simulated->faults}};
   json["joints"] = FleetJson::array();
   for (const FleetJoint& joint : request.joints)
-    json["joints"].push_back(FleetJson::parse(task_text(joint)));
+    json["joints"].push_back(joint_json(joint, request.sha256));
   return json.dump();
 }
 
@@ -132,7 +135,8 @@ CalibrationRequest calibration_from_text(std::string_view text) {
                            .faults = of.at("faults")};
     }
     for (const FleetJson& joint : json.at("joints"))
-      request.joints.push_back(task_from_text(joint.dump()).joint);
+      request.joints.push_back(joint_from(joint, request.sha256));
+    if (!request.base.empty()) request.sha256[request.base] = json.at("base_sha256");
     return request;
   } catch (const FleetJson::exception&) {
     refuse_text("what it calibrates");
@@ -154,6 +158,7 @@ std::string joint_text(const CalibratedJoint& joint) {
                    {"traits", traits_json(joint.traits)},
                    {"methods", std::move(methods)},
                    {"chosen", joint.chosen},
+                   {"base_sha256", joint.base_sha256},
                    {"test_rmse", json_number(joint.test_rmse)}}
       .dump();
 }
@@ -169,7 +174,9 @@ CalibratedJoint joint_from_text(std::string_view text) {
                           .warnings = json.at("warnings"),
                           .traits = traits_from(json.at("traits")),
                           .chosen = json.at("chosen"),
-                          .test_rmse = number_from(json.at("test_rmse"))};
+                          .test_rmse = number_from(json.at("test_rmse")),
+                          // A store that was upgraded may have results without it.
+                          .base_sha256 = json.value("base_sha256", std::string())};
     for (const FleetJson& of : json.at("methods"))
       joint.methods.push_back({.name = of.at("name"),
                                .held_out_rmse = number_from(of.at("held_out_rmse")),

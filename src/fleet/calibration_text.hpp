@@ -8,15 +8,13 @@
 
 namespace torsio {
 
-/// A joint of a study with the hashes of its files, as its trial keeps it.
-struct JointTask {
-  FleetJoint joint;
-  std::map<std::string, std::string> sha256 = {};  ///< by path
-};
+/// Hashes of files (SHA-256) by their paths.
+using FileHashes = std::map<std::string, std::string>;
 
-[[nodiscard]] std::string task_text(const FleetJoint& joint);
-/// @throws Error if the text is not of `task_text`.
-[[nodiscard]] JointTask task_from_text(std::string_view text);
+/// A joint with the hashes of its files, as a trial keeps it.
+[[nodiscard]] std::string task_text(const FleetJoint& joint, const FileHashes& sha256);
+/// @param sha256 gets the hashes. @throws Error if the text is not of `task_text`.
+[[nodiscard]] FleetJoint task_from_text(std::string_view text, FileHashes& sha256);
 
 /// @throws Error if the text is not of `calibration_text`.
 [[nodiscard]] CalibrationRequest calibration_from_text(std::string_view text);

@@ -6,6 +6,7 @@
 
 #include "data/yaml_reader.hpp"
 #include "fleet/calibration.hpp"
+#include "search/specimen_study.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -72,6 +73,29 @@ CalibrationRequest read_fleet_list(const std::string& path) {
                        .found = fmt::format("{}, listed for {}", file, known->second)});
   }
   if (request.joints.empty()) joints.refuse("at least one joint");
+  return request;
+}
+
+CalibrationRequest calibration_request(const FleetChoice& choice) {
+  if (choice.list.empty() == choice.specimens.empty())
+    throw UsageError({.place = "fleet calibrate",
+                      .expected = "either a list of joints or specimens",
+                      .found = choice.list.empty() ? "neither" : "both",
+                      .advice = "torsio fleet calibrate robot.yaml"});
+  CalibrationRequest request;
+  if (!choice.list.empty()) {
+    request = read_fleet_list(choice.list);
+  } else {
+    const SpecimenRequest range = specimen_range(choice.specimens);
+    request.simulated = {.actuator = range.actuator,
+                         .first = range.first,
+                         .last = range.last,
+                         .faults = choice.faults};
+  }
+  if (!choice.base.empty()) request.base = choice.base;
+  if (!choice.model.empty()) request.model = choice.model;
+  request.seed = choice.seed;
+  request.only_compares = choice.only_compares;
   return request;
 }
 

@@ -130,29 +130,50 @@ std::string head_text(const FleetCalibration& fleet) {
       fleet.outliers.size() == 1 ? "1 differs" : fmt::format("{} differ", fleet.outliers.size()));
 }
 
-/// How many of the planted faults were found, with their kind.
-std::string planted_text(const FleetCalibration& fleet) {
-  const auto planted = static_cast<std::size_t>(std::ranges::count_if(
-      fleet.joints, [](const CalibratedJoint& joint) { return !joint.fault.empty(); }));
-  if (planted == 0) return {};
+/// How many of the planted faults were found.
+struct PlantedFaults {
+  std::size_t planted = 0;
   std::size_t found = 0;
-  std::size_t right = 0;
-  std::size_t sound = 0;
+  std::size_t right = 0;  ///< with their kind
+  std::size_t sound = 0;  ///< sound joints that are listed
+};
+
+PlantedFaults planted_in(const FleetCalibration& fleet) {
+  PlantedFaults faults;
+  faults.planted = static_cast<std::size_t>(std::ranges::count_if(
+      fleet.joints, [](const CalibratedJoint& joint) { return !joint.fault.empty(); }));
   for (const FleetOutlier& outlier : fleet.outliers) {
     const CalibratedJoint& joint = fleet.joints[outlier.joint];
-    if (joint.fault.empty()) ++sound;
-    if (joint.fault.empty()) continue;
-    ++found;
-    if (joint.fault_trait == outlier.trait) ++right;
+    if (joint.fault.empty()) {
+      ++faults.sound;
+      continue;
+    }
+    ++faults.found;
+    if (joint.fault_trait == outlier.trait) ++faults.right;
   }
+  return faults;
+}
+
+std::string planted_text(const FleetCalibration& fleet) {
+  const PlantedFaults faults = planted_in(fleet);
+  if (faults.planted == 0) return {};
   std::string text =
       fmt::format("planted faults: {} of {} found, {} of them with the right kind; {} listed\n",
-                  found, planted, right, plural(sound, "sound joint"));
+                  faults.found, faults.planted, faults.right, plural(faults.sound, "sound joint"));
   for (std::size_t i = 0; i < fleet.joints.size(); ++i)
     if (!fleet.joints[i].fault.empty() &&
         std::ranges::find(fleet.outliers, i, &FleetOutlier::joint) == fleet.outliers.end())
       text += fmt::format("  not found: {}, {}\n", fleet.joints[i].serial, fleet.joints[i].fault);
   return text;
+}
+
+FleetTextJson planted_json(const FleetCalibration& fleet) {
+  const PlantedFaults faults = planted_in(fleet);
+  if (faults.planted == 0) return nullptr;
+  return {{"planted", faults.planted},
+          {"found", faults.found},
+          {"with_right_kind", faults.right},
+          {"sound_listed", faults.sound}};
 }
 
 std::string tails_text(const FleetCalibration::OfType& type) {
@@ -186,6 +207,7 @@ FleetTextJson joint_json(const CalibratedJoint& joint) {
           {"failure", text_or_null(joint.failure)},
           {"warnings", joint.warnings},
           {"chosen", text_or_null(joint.chosen)},
+          {"base_sha256", text_or_null(joint.base_sha256)},
           {"test_rmse", json_number(joint.test_rmse)},
           {"methods", std::move(methods)},
           {"traits", std::move(traits)}};
@@ -294,7 +316,8 @@ std::string fleet_json(const FleetCalibration& fleet) {
   }
   return json_text(FleetTextJson{{"joints", std::move(joints)},
                                  {"types", std::move(types)},
-                                 {"outliers", std::move(outliers)}});
+                                 {"outliers", std::move(outliers)},
+                                 {"planted_faults", planted_json(fleet)}});
 }
 
 ReportDocument fleet_report(const FleetCalibration& fleet) {

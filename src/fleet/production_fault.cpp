@@ -101,8 +101,8 @@ JointTrait trait_of(ProductionFault fault) noexcept {
   return JointTrait::loose_sensor;
 }
 
-std::optional<ProductionFault> planted_fault(const SimulatedFleet& fleet, std::uint64_t seed,
-                                             std::uint64_t serial) {
+std::map<std::uint64_t, ProductionFault> planted_faults(const SimulatedFleet& fleet,
+                                                        std::uint64_t seed) {
   // The joints with the lowest hashes have the faults.
   std::vector<std::pair<std::uint64_t, std::uint64_t>> order;
   order.reserve(fleet.last + 1 - fleet.first);
@@ -111,9 +111,10 @@ std::optional<ProductionFault> planted_fault(const SimulatedFleet& fleet, std::u
                        each);
   const std::size_t count = std::min(fleet.faults, order.size());
   std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(count));
+  std::map<std::uint64_t, ProductionFault> faults;
   for (std::size_t k = 0; k < count; ++k)
-    if (order[k].second == serial) return kProductionFaults.at(k % kProductionFaults.size());
-  return std::nullopt;
+    faults[order[k].second] = kProductionFaults.at(k % kProductionFaults.size());
+  return faults;
 }
 
 Dataset production_recordings(const std::string& specimen, std::optional<ProductionFault> fault,

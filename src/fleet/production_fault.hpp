@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,10 +24,9 @@ enum class ProductionFault : std::uint8_t {
 /// The trait by which it is to be found.
 [[nodiscard]] JointTrait trait_of(ProductionFault fault) noexcept;
 
-/// The fault of a serial number of the fleet, if it has one: `faults` of the joints, all kinds in turn.
-[[nodiscard]] std::optional<ProductionFault> planted_fault(const SimulatedFleet& fleet,
-                                                           std::uint64_t seed,
-                                                           std::uint64_t serial);
+/// The serial numbers of the fleet that have a fault: `faults` of them, all kinds in turn.
+[[nodiscard]] std::map<std::uint64_t, ProductionFault> planted_faults(const SimulatedFleet& fleet,
+                                                                      std::uint64_t seed);
 
 /// Recordings of a specimen as a production line would make them: noise with the output locked and a sweep with a lever to
 /// train on, other noise to test.

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <utility>
 
-#include "data/byte_source.hpp"
 #include "evaluate/drift/verdicts.hpp"
 #include "files/json_text.hpp"
+#include "numerics/parallel.hpp"
 #include "search/stored_path.hpp"
 #include "torsio/core/error.hpp"
 
@@ -103,28 +104,14 @@ double severity_of(const DriftEntry& entry) {
              : kNotMeasured;
 }
 
-/// Adds the files of a joint. @returns their uses by its model
-std::vector<RecordingUse> add_recordings(Registry& registry, const CalibrationRequest& request,
-                                         const std::string& serial) {
-  std::vector<RecordingUse> uses;
-  const auto joint = std::ranges::find(request.joints, serial, &FleetJoint::serial);
-  if (joint == request.joints.end()) return uses;  // simulated
-  const auto add = [&](const std::vector<std::string>& files, Role role) {
-    for (const std::string& file : files) {
-      uses.push_back({.sha256 = sha256_of_file(file), .role = std::string(name(role))});
-      registry.add_recording(
-          {.sha256 = uses.back().sha256, .device = serial, .file = stored_path(file)});
-    }
-  };
-  add(joint->train, Role::train);
-  add(joint->test, Role::test);
-  return uses;
-}
+/// What recordings showed of a joint; nothing of it is in the registry yet.
+struct Comparison {
+  std::vector<RegisteredRecording> recordings;
+  DriftEntry entry;
+};
 
-}  // namespace
-
-void watch_joint(Registry& registry, const FleetJoint& joint, const CalibrationRequest& request,
-                 const Progress& progress) {
+Comparison compare(Registry& registry, const FleetJoint& joint, const CalibrationRequest& request,
+                   const Progress& progress) {
   const auto [id, model] = current_model(registry, joint.serial);
   LoadOptions options = load_options(request, progress);
   if (options.target.empty()) options.target = model.settings.target;
@@ -133,32 +120,110 @@ void watch_joint(Registry& registry, const FleetJoint& joint, const CalibrationR
   std::vector<std::string> files = joint.train;
   files.insert(files.end(), joint.test.begin(), joint.test.end());
   const Dataset dataset = load_dataset({}, files, options);
+  Comparison result;
+  result.recordings.reserve(dataset.records.size());
   for (const DatasetRecord& record : dataset.records)
-    registry.add_recording({.sha256 = record.recording.source.sha256,
-                            .device = joint.serial,
-                            .file = stored_path(record.recording.source.file),
-                            .samples = record.recording.size(),
-                            .rate_Hz = record.recording.sample_rate_Hz()});
-  DriftEntry entry = entry_of(detect_drift(model, dataset, {}, progress));
-  entry.device = joint.serial;
-  entry.model = id;
-  entry.recording = dataset.records.front().recording.source.sha256;
-  registry.add_drift(entry);
+    result.recordings.push_back({.sha256 = record.recording.source.sha256,
+                                 .device = joint.serial,
+                                 .file = stored_path(record.recording.source.file),
+                                 .samples = record.recording.size(),
+                                 .rate_Hz = record.recording.sample_rate_Hz()});
+  result.entry = entry_of(detect_drift(model, dataset, {}, progress));
+  result.entry.device = joint.serial;
+  result.entry.model = id;
+  result.entry.recording = result.recordings.front().sha256;
+  return result;
 }
 
-std::vector<std::string> watch_joints(Registry& registry, const CalibrationRequest& request,
-                                      const Progress& progress) {
-  std::vector<std::string> failures;
-  for (const FleetJoint& joint : request.joints) {
+void enter(Registry& registry, const Comparison& comparison) {
+  for (const RegisteredRecording& recording : comparison.recordings)
+    registry.add_recording(recording);
+  registry.add_drift(comparison.entry);
+}
+
+/// The comparisons of a list, by several threads.
+class ListWatch {
+ public:
+  ListWatch(Registry& registry, const CalibrationRequest& request, const Progress& progress)
+      : registry_(registry),
+        request_(request),
+        progress_(progress),
+        outcomes_(request.joints.size()) {}
+
+  std::vector<std::string> run(std::size_t threads) {
+    for_each_chunk(outcomes_.size(), threads, [&](std::size_t joint) { compare_one(joint); });
+    return std::move(failures_);
+  }
+
+ private:
+  struct Outcome {
+    Comparison comparison = {};
+    std::string failure = {};
+  };
+
+  void compare_one(std::size_t joint) {
+    const FleetJoint& of = request_.joints[joint];
+    Outcome outcome;
+    guarded(outcome, [&] {
+      outcome.comparison = compare(registry_, of, request_, [this](double, std::string_view) {
+        const std::scoped_lock lock(guard_);
+        return report();
+      });
+    });
+    const std::scoped_lock lock(guard_);
+    outcomes_[joint] = std::move(outcome);
+    enter_finished();
+    if (!report()) throw Cancelled();
+  }
+
+  /// In the order of the list, so that the history does not depend on the threads.
+  void enter_finished() {
+    for (; entered_ < outcomes_.size() && outcomes_[entered_]; ++entered_) {
+      Outcome& outcome = *outcomes_[entered_];
+      if (outcome.failure.empty()) guarded(outcome, [&] { enter(registry_, outcome.comparison); });
+      if (!outcome.failure.empty())
+        failures_.push_back(
+            fmt::format("{}: {}", request_.joints[entered_].serial, outcome.failure));
+      outcome = {};
+    }
+  }
+
+  [[nodiscard]] bool report() const {
+    const double share = static_cast<double>(entered_) / static_cast<double>(outcomes_.size());
+    return !progress_ || progress_(share, "comparing joints");
+  }
+
+  /// An error is the failure of its joint alone.
+  template <class Work>
+  static void guarded(Outcome& outcome, const Work& work) {
     try {
-      watch_joint(registry, joint, request, progress);
+      work();
     } catch (const Cancelled&) {
       throw;
     } catch (const Error& error) {
-      failures.push_back(fmt::format("{}: {}", joint.serial, error.what()));
+      outcome.failure = error.what();
     }
   }
-  return failures;
+
+  Registry& registry_;
+  const CalibrationRequest& request_;
+  const Progress& progress_;
+  std::mutex guard_;  // guards all that follows, and the listener
+  std::vector<std::optional<Outcome>> outcomes_;
+  std::size_t entered_ = 0;
+  std::vector<std::string> failures_;
+};
+
+}  // namespace
+
+void watch_joint(Registry& registry, const FleetJoint& joint, const CalibrationRequest& request,
+                 const Progress& progress) {
+  enter(registry, compare(registry, joint, request, progress));
+}
+
+std::vector<std::string> watch_joints(Registry& registry, const CalibrationRequest& request,
+                                      std::size_t threads, const Progress& progress) {
+  return ListWatch(registry, request, progress).run(threads);
 }
 
 std::vector<WatchedJoint> rank_by_drift(Registry& registry) {
@@ -185,35 +250,6 @@ std::vector<WatchedJoint> rank_by_drift(Registry& registry) {
     return rank(a) < rank(b);
   });
   return joints;
-}
-
-RegisteredFleet register_fleet(Registry& registry, StudyStore& store, const FleetCalibration& fleet,
-                               const CalibrationRequest& request, bool promotes,
-                               const std::string& by) {
-  RegisteredFleet result;
-  for (std::size_t i = 0; i < fleet.joints.size(); ++i) {
-    const CalibratedJoint& joint = fleet.joints[i];
-    registry.add_device({.serial = joint.serial, .type = joint.type});
-    if (joint.chosen.empty()) continue;  // no model was made
-    const std::optional<RegisteredModel> before = registry.current(joint.serial);
-    NewModel added{.device = joint.serial,
-                   .bytes = store.samples(joint.trial),
-                   .file = joint.serial + ".safetensors",
-                   .by = by,
-                   .note = fmt::format("fleet calibrate: {}", joint.chosen),
-                   .recordings = add_recordings(registry, request, joint.serial),
-                   .trial = joint.trial};
-    if (before && before->trial != joint.trial) added.parent = before->id;
-    const std::int64_t model = registry.add_model(added);
-    ++result.models;
-    if (!promotes) continue;
-    if (std::ranges::find(fleet.outliers, i, &FleetOutlier::joint) != fleet.outliers.end()) {
-      result.refused.push_back(joint.serial + ": it differs from the others of its type");
-      continue;
-    }
-    if (registry.promote(joint.serial, model, by, "fleet calibrate")) ++result.promoted;
-  }
-  return result;
 }
 
 }  // namespace torsio

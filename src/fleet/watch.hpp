@@ -26,7 +26,6 @@ struct WatchedJoint {
   std::string advice = {};                ///< what the last comparison advises
   std::size_t comparisons = 0;            ///< in the history
   double severity_before = kNotMeasured;  ///< severity in the comparison before
-  std::string failure = {};               ///< why the recordings of today could not be compared
 };
 
 /// Compares the recordings of a joint with its current model (`detect_drift`), and adds the result to the history.
@@ -35,26 +34,16 @@ struct WatchedJoint {
 void watch_joint(Registry& registry, const FleetJoint& joint, const CalibrationRequest& request,
                  const Progress& progress = {});
 
-/// `watch_joint` for each joint of a list. @returns those that could not be compared, with the reason
+/// `watch_joint` for each joint of a list, which are entered in its order.
+/// @param threads joints that are compared at the same time, on which the result does not depend; 0: one for each
+/// core that the process may use
+/// @returns those that could not be compared, with the reason
 [[nodiscard]] std::vector<std::string> watch_joints(Registry& registry,
                                                     const CalibrationRequest& request,
+                                                    std::size_t threads = 0,
                                                     const Progress& progress = {});
 
 /// All joints of the registry, the largest drift first; those never compared last.
 [[nodiscard]] std::vector<WatchedJoint> rank_by_drift(Registry& registry);
-
-struct RegisteredFleet {
-  std::size_t models = 0;
-  std::size_t promoted = 0;
-  std::vector<std::string> refused =
-      {};  ///< joints whose model was not made current, with the reason
-};
-
-/// Adds the joints of a calibration to the registry, with their recordings and models. Repeated, it adds nothing.
-/// @param promotes also makes the models current of joints that do not differ from the others of their type
-[[nodiscard]] RegisteredFleet register_fleet(Registry& registry, StudyStore& store,
-                                             const FleetCalibration& fleet,
-                                             const CalibrationRequest& request, bool promotes,
-                                             const std::string& by);
 
 }  // namespace torsio

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "data/load_roles.hpp"
+#include "search/changed_recording.hpp"
 #include "search/stored_path.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -83,14 +84,11 @@ void refuse_changed(const RequestJson& before, const RequestJson& now) {
   for (std::size_t i = 0; i < std::min(before.size(), now.size()); ++i) {
     const bool is_file = before[i].at("file") == now[i].at("file");
     if (is_file && before[i] == now[i]) continue;
-    const bool has_changed = is_file && before[i].at("sha256") != now[i].at("sha256");
-    throw Error({.place = now[i].at("file").get<std::string>(),
-                 .problem = has_changed ? "this recording has changed since the study began"
-                                        : "this recording is read in another way than when the "
-                                          "study began (mapping, roles or order)",
-                 .expected = has_changed ? "SHA-256 " + before[i].at("sha256").get<std::string>()
-                                         : std::string(),
-                 .found = has_changed ? now[i].at("sha256").get<std::string>() : std::string(),
+    const std::string file = now[i].at("file");
+    if (is_file) refuse_changed_recording(file, before[i].at("sha256"), now[i].at("sha256"));
+    throw Error({.place = file,
+                 .problem = "this recording is read in another way than when the study began "
+                            "(mapping, roles or order)",
                  .advice = "Restore the file, or begin a study with another name."});
   }
   throw Error({.place = "study",

@@ -71,8 +71,9 @@ class Database {
   [[nodiscard]] virtual std::string_view counted_key() const noexcept = 0;
   [[nodiscard]] virtual std::string_view bytes_type() const noexcept = 0;
   /// Statements after which no row of the table can be removed, and none of these columns changed.
+  /// @param key column whose rows cannot be replaced either; empty: they may be, by the same
   /// @param columns separated by commas; empty: all
-  [[nodiscard]] virtual std::string keep_rows(std::string_view table,
+  [[nodiscard]] virtual std::string keep_rows(std::string_view table, std::string_view key,
                                               std::string_view columns = {}) const = 0;
 
  protected:

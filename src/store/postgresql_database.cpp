@@ -196,7 +196,8 @@ class PostgresqlDatabase final : public Database {
   std::string_view skip_locked() const noexcept override { return " FOR UPDATE SKIP LOCKED"; }
   std::string_view counted_key() const noexcept override { return "BIGSERIAL PRIMARY KEY"; }
   std::string_view bytes_type() const noexcept override { return "BYTEA"; }
-  std::string keep_rows(std::string_view table, std::string_view columns) const override {
+  std::string keep_rows(std::string_view table, std::string_view /*key*/,
+                        std::string_view columns) const override {
     return fmt::format(
         "CREATE FUNCTION keep_{0}() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN RAISE EXCEPTION "
         "'rows of {0} are kept as they are'; END $$;\n"

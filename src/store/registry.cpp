@@ -149,7 +149,10 @@ std::int64_t insert_model(Database& database, const NewModel& model, const Model
        std::to_string(parsed.card.seed), text_of_metrics(parsed.card.metrics),
        id_or_null(model.parent), id_or_null(model.trial), model.by, model.note,
        static_cast<std::int64_t>(model.bytes.size()), Blob{model.bytes}});
-  return RowReader(rows.front()).whole(0);
+  const std::int64_t id = RowReader(rows.front()).whole(0);
+  if (!model.base_sha256.empty())
+    database.run("INSERT INTO model_bases(model, sha256) VALUES($1, $2)", {id, model.base_sha256});
+  return id;
 }
 
 }  // namespace
@@ -234,8 +237,9 @@ std::vector<RegisteredRecording> Registry::recordings(std::string_view serial) {
          rows_of(database, serial,
                  "SELECT sha256, device, file, samples, rate_Hz, added_at FROM recordings {} "
                  "ORDER BY added_at, sha256",
-                 "WHERE device = $1 OR sha256 IN (SELECT r.recording FROM model_recordings r JOIN "
-                 "models m ON m.id = r.model WHERE m.device = $1)")) {
+                 "WHERE sha256 IN (SELECT sha256 FROM recordings WHERE device = $1 UNION SELECT "
+                 "r.recording FROM model_recordings r JOIN models m ON m.id = r.model WHERE "
+                 "m.device = $1)")) {
       const RowReader row(each);
       all.push_back({.sha256 = row.text(0),
                      .device = row.text(1),
@@ -316,6 +320,17 @@ std::vector<RegisteredModel> Registry::lineage(std::int64_t id) {
   std::vector<RegisteredModel> models{model(id)};
   while (models.back().parent) models.push_back(model(*models.back().parent));
   return models;
+}
+
+std::optional<RegisteredModel> Registry::model_of_file(std::string_view sha256) {
+  return connection_->run([&](Database& database) -> std::optional<RegisteredModel> {
+    const auto rows = database.run(
+        fmt::format("SELECT {} FROM models m WHERE m.sha256 = $1 ORDER BY m.id LIMIT 1",
+                    kModelColumns),
+        {std::string(sha256)});
+    if (rows.empty()) return std::nullopt;
+    return model_from(RowReader(rows.front()));
+  });
 }
 
 std::string Registry::model_bytes(std::string_view serial, std::int64_t id) {

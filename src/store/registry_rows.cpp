@@ -76,7 +76,8 @@ RegisteredModel model_from(const RowReader& row) {
                         .added_at_s = row.real(11),
                         .added_by = row.text(12),
                         .note = row.text(13),
-                        .size = static_cast<std::size_t>(row.whole(14))};
+                        .size = static_cast<std::size_t>(row.whole(14)),
+                        .base_sha256 = row.text(15)};
   model.options = nlohmann::json::parse(row.text(6)).get<std::map<std::string, std::string>>();
   const auto metrics = nlohmann::json::parse(row.text(8));
   for (const auto& [name, value] : metrics.items())

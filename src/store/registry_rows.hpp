@@ -42,8 +42,9 @@ inline constexpr std::string_view kDeviceColumns = "d.serial, d.type, d.note, d.
 
 inline constexpr std::string_view kModelColumns =
     "m.id, m.device, m.sha256, m.family, m.file, m.torsio_version, m.options, m.seed, m.metrics, "
-    "m.parent, m.trial, m.added_at, m.added_by, m.note, m.size";
-inline constexpr std::size_t kModelColumnCount = 15;
+    "m.parent, m.trial, m.added_at, m.added_by, m.note, m.size, "
+    "(SELECT b.sha256 FROM model_bases b WHERE b.model = m.id)";
+inline constexpr std::size_t kModelColumnCount = 16;
 /// Without its recordings.
 [[nodiscard]] RegisteredModel model_from(const RowReader& row);
 

@@ -151,8 +151,20 @@ CREATE INDEX drift_of_device ON drift(device, id);
 {keep_drift}
 )sql";
 
+/// Version 3: the file that a model was transferred from, which need not be in the registry; models and their lineage
+/// are kept as they are.
+constexpr std::string_view kVersion3 = R"sql(
+CREATE TABLE model_bases(
+  model BIGINT PRIMARY KEY REFERENCES models(id),
+  sha256 TEXT NOT NULL);
+CREATE INDEX models_by_hash ON models(sha256);
+{keep_models}
+{keep_model_recordings}
+{keep_model_bases}
+)sql";
+
 /// The script of each version, from 1.
-constexpr auto kScripts = std::to_array<std::string_view>({kVersion1, kVersion2});
+constexpr auto kScripts = std::to_array<std::string_view>({kVersion1, kVersion2, kVersion3});
 static_assert(kScripts.size() == kStoreVersion);
 
 std::int64_t version_of(Database& database) {
@@ -166,9 +178,13 @@ void apply(Database& database, std::int64_t version) {
   fmt::dynamic_format_arg_store<fmt::format_context> words;
   words.push_back(fmt::arg("counted_key", database.counted_key()));
   words.push_back(fmt::arg("bytes_type", database.bytes_type()));
-  words.push_back(fmt::arg("keep_devices", database.keep_rows("devices", "serial")));
-  words.push_back(fmt::arg("keep_promotions", database.keep_rows("promotions")));
-  words.push_back(fmt::arg("keep_drift", database.keep_rows("drift")));
+  words.push_back(fmt::arg("keep_devices", database.keep_rows("devices", "serial", "serial")));
+  words.push_back(fmt::arg("keep_promotions", database.keep_rows("promotions", "id")));
+  words.push_back(fmt::arg("keep_drift", database.keep_rows("drift", "id")));
+  words.push_back(fmt::arg("keep_models", database.keep_rows("models", "id")));
+  // All its columns are its key: a row that replaces another one is the same.
+  words.push_back(fmt::arg("keep_model_recordings", database.keep_rows("model_recordings", {})));
+  words.push_back(fmt::arg("keep_model_bases", database.keep_rows("model_bases", "model")));
   database.run_script(fmt::vformat(kScripts.at(static_cast<std::size_t>(version - 1)), words));
   database.run(fmt::format("INSERT INTO schema_version VALUES($1, {}, $2)", database.now()),
                {version, std::string(kVersion)});

@@ -5,7 +5,7 @@
 namespace torsio {
 
 /// The version of the tables that this program reads and writes.
-inline constexpr std::int64_t kStoreVersion = 2;
+inline constexpr std::int64_t kStoreVersion = 3;
 
 /// Creates the tables of an empty store, once also if several programs do so at the same time.
 /// @param place name of the store, for messages

@@ -115,16 +115,21 @@ class SqliteDatabase final : public Database {
     return "INTEGER PRIMARY KEY AUTOINCREMENT";
   }
   std::string_view bytes_type() const noexcept override { return "BLOB"; }
-  std::string keep_rows(std::string_view table, std::string_view columns) const override {
-    // INSERT OR REPLACE removes a row without calling a trigger on DELETE.
-    return fmt::format(
+  std::string keep_rows(std::string_view table, std::string_view key,
+                        std::string_view columns) const override {
+    const std::string refusal =
+        fmt::format("SELECT RAISE(ABORT, 'rows of {} are kept as they are');", table);
+    std::string triggers = fmt::format(
         "CREATE TRIGGER {0}_change BEFORE UPDATE{1}{2} ON {0} BEGIN {3} END;\n"
-        "CREATE TRIGGER {0}_removal BEFORE DELETE ON {0} BEGIN {3} END;\n"
-        "CREATE TRIGGER {0}_replacement BEFORE INSERT ON {0} WHEN EXISTS(SELECT 1 FROM {0} WHERE "
-        "{4} = NEW.{4}) BEGIN {3} END;\n",
-        table, columns.empty() ? "" : " OF ", columns,
-        fmt::format("SELECT RAISE(ABORT, 'rows of {} are kept as they are');", table),
-        columns.empty() ? "id" : columns);
+        "CREATE TRIGGER {0}_removal BEFORE DELETE ON {0} BEGIN {3} END;\n",
+        table, columns.empty() ? "" : " OF ", columns, refusal);
+    // INSERT OR REPLACE removes a row without calling a trigger on DELETE.
+    if (!key.empty())
+      triggers += fmt::format(
+          "CREATE TRIGGER {0}_replacement BEFORE INSERT ON {0} WHEN EXISTS(SELECT 1 FROM {0} WHERE "
+          "{1} = NEW.{1}) BEGIN {2} END;\n",
+          table, key, refusal);
+    return triggers;
   }
 
  private:

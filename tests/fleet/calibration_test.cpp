@@ -1,19 +1,24 @@
 #include "fleet/calibration.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <numbers>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "data/byte_source.hpp"
 #include "fleet/calibration_text.hpp"
 #include "fleet/fleet_text.hpp"
 #include "fleet/joint_traits.hpp"
 #include "fleet/production_fault.hpp"
+#include "fleet/registration.hpp"
 #include "fleet/watch.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
@@ -81,18 +86,22 @@ TEST(CalibrationTextTest, AJointIsReadAsItWasWritten) {
   EXPECT_TRUE(std::isnan(read.methods.front().held_out_rmse));
   EXPECT_EQ(joint_text(read), joint_text(joint));
   EXPECT_THROW(static_cast<void>(joint_from_text("{")), Error);
-  EXPECT_THROW(static_cast<void>(task_from_text("[]")), Error);
+  FileHashes sha256;
+  EXPECT_THROW(static_cast<void>(task_from_text("[]", sha256)), Error);
   EXPECT_THROW(static_cast<void>(calibration_from_text("{}")), Error);
 }
 
 TEST(ProductionFaultTest, AsManyAreSpreadAsWereAskedFor) {
   const SimulatedFleet fleet{.first = 1, .last = 200, .faults = 12};
+  const auto faults = planted_faults(fleet, 5);
+  EXPECT_EQ(planted_faults(fleet, 5), faults);
+  EXPECT_NE(planted_faults(fleet, 6), faults);
   std::map<ProductionFault, int> kinds;
-  for (std::uint64_t serial = fleet.first; serial <= fleet.last; ++serial)
-    if (const auto fault = planted_fault(fleet, 5, serial)) {
-      ++kinds[*fault];
-      EXPECT_EQ(planted_fault(fleet, 5, serial), fault);
-    }
+  for (const auto& [serial, fault] : faults) {
+    EXPECT_GE(serial, fleet.first);
+    EXPECT_LE(serial, fleet.last);
+    ++kinds[fault];
+  }
   EXPECT_EQ(kinds.size(), 6U);
   for (const auto& [fault, count] : kinds) EXPECT_EQ(count, 2) << name(fault);
 }
@@ -226,8 +235,30 @@ class CalibrationStudyTest : public testing::Test {
     return file;
   }
 
-  StoredStudy study_in(StudyStore& store, CalibrationStudy& kind) {
-    return begin_calibration(store, "robot", request_, kind);
+  static StoredStudy study_in(StudyStore& store, const CalibrationStudy& kind) {
+    return begin_calibration(store, "robot", kind);
+  }
+
+  /// A store with the models of the joints, all of them current.
+  std::string calibrated_store(const std::string& name) {
+    const StoreAddress address = store_address(folder_.path(name));
+    StudyStore store(address);
+    CalibrationStudy kind(request_);
+    const StoredStudy study = study_in(store, kind);
+    run_workers(store, study, kind, {.threads = 1});
+    Registry registry(address);
+    EXPECT_EQ(register_fleet(registry, store, calibration_result(store, study), kind.request(),
+                             true, "a test")
+                  .promoted,
+              request_.joints.size());
+    return address.target;
+  }
+
+  /// The base is the model of the first joint, in a file.
+  void use_base_in_file() {
+    Registry registry(store_address(calibrated_store("base.sqlite")));
+    const std::string bytes = registry.model_bytes("J03", registry.current("J03")->id);
+    request_.base = folder_.file("base.safetensors", bytes);
   }
 
   TemporaryFolder folder_;
@@ -251,12 +282,17 @@ TEST_F(CalibrationStudyTest, EachJointGetsItsOwnModel) {
     const ModelFile model = parse_model(std::as_bytes(std::span(bytes)), "model", joint.serial);
     EXPECT_EQ(model.card.device_serial, joint.serial);
   }
+  EXPECT_EQ(fleet.joints[0].chosen, "base") << "it is the first of its type";
+  EXPECT_EQ(fleet.joints[0].methods.size(), 1U);
+  EXPECT_EQ(fleet.joints[1].methods.back().name, "own fit");
 
   Registry registry(address);
-  const RegisteredFleet added = register_fleet(registry, store, fleet, request_, true, "a test");
+  const RegisteredFleet added =
+      register_fleet(registry, store, fleet, kind.request(), true, "a test");
   EXPECT_EQ(added.models, 2U);
   EXPECT_EQ(added.promoted, 2U);
-  const RegisteredFleet again = register_fleet(registry, store, fleet, request_, true, "a test");
+  const RegisteredFleet again =
+      register_fleet(registry, store, fleet, kind.request(), true, "a test");
   EXPECT_EQ(again.promoted, 0U);
   EXPECT_EQ(registry.models().size(), 2U);
   EXPECT_THAT(registry.verify(), IsEmpty());
@@ -268,6 +304,119 @@ TEST_F(CalibrationStudyTest, EachJointGetsItsOwnModel) {
   ASSERT_EQ(ranked.size(), 2U);
   EXPECT_EQ(ranked.front().comparisons, 1U);
   EXPECT_GE(ranked.front().severity, ranked.back().severity);
+}
+
+TEST_F(CalibrationStudyTest, AModelThatWasTransferredHasItsBaseInItsLineage) {
+  request_.model = "linear";
+  Registry registry(store_address(calibrated_store("robot.sqlite")));
+  const RegisteredModel first = registry.models("J03").front();
+  const RegisteredModel second = registry.models("J04").front();
+  EXPECT_EQ(first.base_sha256, "");
+  EXPECT_THAT(second.note, HasSubstr("transfer"));
+  EXPECT_EQ(second.base_sha256, first.sha256);
+  EXPECT_EQ(registry.model_of_file(second.base_sha256)->device, "J03");
+}
+
+TEST_F(CalibrationStudyTest, TheBaseOfAFileIsKnownByItsHash) {
+  request_.model = "linear";
+  use_base_in_file();
+  StudyStore store({.kind = StoreAddress::Kind::memory, .target = {}});
+  CalibrationStudy kind(request_);
+  const StoredStudy study = study_in(store, kind);
+  run_workers(store, study, kind, {.threads = 1});
+  const FleetCalibration fleet = calibration_result(store, study);
+  EXPECT_THAT(fleet.joints[1].chosen, HasSubstr("transfer"));
+  EXPECT_EQ(fleet.joints[1].base_sha256, sha256_of_file(request_.base));
+}
+
+TEST_F(CalibrationStudyTest, ABaseThatHasChangedIsRefused) {
+  use_base_in_file();
+  StudyStore store({.kind = StoreAddress::Kind::memory, .target = {}});
+  CalibrationStudy kind(request_);
+  const StoredStudy study = study_in(store, kind);
+  std::ofstream(request_.base, std::ios::app) << " ";
+  EXPECT_THAT(
+      test::error_message([&] { run_workers(store, study, kind, {.threads = 1}); }),
+      testing::AllOf(HasSubstr("base.safetensors"), HasSubstr("has changed since the study")));
+}
+
+TEST_F(CalibrationStudyTest, TheFirstUsableJointIsTheBaseOfItsType) {
+  std::ofstream(request_.joints[0].train.front()) << "time_s,torque_Nm\n0,1\n0.001,1\n";
+  StudyStore store({.kind = StoreAddress::Kind::memory, .target = {}});
+  CalibrationStudy kind(request_);
+  const StoredStudy study = study_in(store, kind);
+  run_workers(store, study, kind, {.threads = 1});
+  const FleetCalibration fleet = calibration_result(store, study);
+  EXPECT_NE(fleet.joints[0].failure, "");
+  EXPECT_EQ(fleet.joints[1].failure, "");
+  EXPECT_EQ(fleet.joints[1].chosen, "base");
+}
+
+TEST_F(CalibrationStudyTest, AStudyThatIsResumedRefusesARecordingThatHasChanged) {
+  StudyStore store({.kind = StoreAddress::Kind::memory, .target = {}});
+  study_in(store, CalibrationStudy(request_));
+  EXPECT_EQ(study_in(store, CalibrationStudy(request_)).name, "robot");
+  std::ofstream(request_.joints[1].test.front(), std::ios::app) << "\n";
+  EXPECT_THAT(test::error_message([&] { study_in(store, CalibrationStudy(request_)); }),
+              testing::AllOf(HasSubstr("0004-2.csv"), HasSubstr("has changed since the study")));
+}
+
+TEST_F(CalibrationStudyTest, AModelIsRegisteredWithTheRecordingsThatItWasMadeFrom) {
+  const StoreAddress address = store_address(folder_.path("robot.sqlite"));
+  StudyStore store(address);
+  CalibrationStudy kind(request_);
+  const StoredStudy study = study_in(store, kind);
+  run_workers(store, study, kind, {.threads = 1});
+  const std::string before = sha256_of_file(request_.joints[1].train.front());
+  std::ofstream(request_.joints[1].train.front(), std::ios::app) << "\n";  // too late for the study
+  Registry registry(address);
+  static_cast<void>(register_fleet(registry, store, calibration_result(store, study),
+                                   kind.request(), false, "a test"));
+  EXPECT_THAT(registry.models("J04").front().recordings,
+              testing::Contains(RecordingUse{before, "train"}));
+}
+
+/// What a comparison found, without its times.
+std::string history_text(Registry& registry) {
+  std::string text;
+  for (const RegisteredDevice& device : registry.devices())
+    for (const DriftEntry& each : registry.drift_history(device.serial))
+      text += fmt::format("{} {} {} {} {} {}\n", each.id, each.device, each.model, each.recording,
+                          each.rmse, each.details);
+  return text;
+}
+
+TEST_F(CalibrationStudyTest, TheHistoryOfDriftDoesNotDependOnTheThreads) {
+  const std::string store = calibrated_store("robot.sqlite");
+  CalibrationRequest today = request_;
+  for (FleetJoint& joint : today.joints) {
+    joint.train = joint.test;
+    joint.test.clear();
+  }
+  today.joints.insert(today.joints.begin(), {.serial = "J99", .train = {folder_.path("no.csv")}});
+  today.joints.push_back(
+      {.serial = "J03", .train = {folder_.file("bad.csv", "time_s,torque_Nm\n")}});
+  std::vector<std::string> histories;
+  std::vector<std::vector<std::string>> failures;
+  for (const std::size_t threads : {1U, 4U}) {
+    const std::string copy = folder_.path("copy.sqlite");  // errors name it
+    std::filesystem::copy_file(store, copy, std::filesystem::copy_options::overwrite_existing);
+    Registry registry(store_address(copy));
+    failures.push_back(watch_joints(registry, today, threads));
+    histories.push_back(history_text(registry));
+  }
+  EXPECT_THAT(failures[0], testing::ElementsAre(testing::StartsWith("J99"), HasSubstr("bad.csv")));
+  EXPECT_EQ(failures[1], failures[0]);
+  EXPECT_THAT(histories[0], testing::AllOf(HasSubstr("J03"), HasSubstr("J04")));
+  EXPECT_EQ(histories[1], histories[0]);
+}
+
+TEST_F(CalibrationStudyTest, AWatchThatIsStoppedKeepsWhatItCompared) {
+  Registry registry(store_address(calibrated_store("robot.sqlite")));
+  const auto until_first = [](double share, std::string_view) { return share == 0.0; };
+  EXPECT_THROW(static_cast<void>(watch_joints(registry, request_, 1, until_first)), Cancelled);
+  EXPECT_EQ(registry.drift_history("J03").size(), 1U);
+  EXPECT_THAT(registry.drift_history("J04"), IsEmpty());
 }
 
 TEST_F(CalibrationStudyTest, JointsThatAreOnlyComparedGetNoModel) {

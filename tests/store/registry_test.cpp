@@ -47,6 +47,7 @@ TEST_P(EachRegistry, KeepsAModelWithWhatItWasMadeFrom) {
   NewModel refined = new_model_of(kElbow, 18446744073709551615U);
   refined.parent = base;
   refined.note = "after the new spring";
+  refined.base_sha256 = sha256_hex(model_file_of(kElbow, 1));
   refined.recordings = {{"feed", "test"}};
   const std::int64_t id = registry.add_model(refined);
   EXPECT_EQ(registry.add_model(refined), id) << "the same file again is the same model";
@@ -62,6 +63,9 @@ TEST_P(EachRegistry, KeepsAModelWithWhatItWasMadeFrom) {
   EXPECT_EQ(model.parent, base);
   EXPECT_EQ(model.added_by, "robot@bench");
   EXPECT_EQ(model.note, "after the new spring");
+  EXPECT_EQ(model.base_sha256, refined.base_sha256);
+  EXPECT_EQ(registry.model_of_file(model.base_sha256)->id, base);
+  EXPECT_FALSE(registry.model_of_file("feed"));
   EXPECT_EQ(model.size, refined.bytes.size());
   EXPECT_THAT(model.recordings,
               ElementsAre(RecordingUse{"feed", "test"}, RecordingUse{kExampleHash, "train"}));
@@ -235,9 +239,38 @@ TEST_P(EachRegistry, HistoriesAreOnlyAddedTo) {
   EXPECT_EQ(registry.drift_history(kElbow).front().verdict, "changed");
 }
 
+TEST_P(EachRegistry, ModelsAndTheirLineageAreOnlyAddedTo) {
+  if (GetParam() == "memory") GTEST_SKIP() << "has one connection";
+  Registry registry(address_);
+  registry.add_device({.serial = kElbow});
+  NewModel model = new_model_of(kElbow);
+  model.base_sha256 = "feed";
+  const std::int64_t id = registry.add_model(model);
+  const auto database = open_database(address_);
+  std::vector<std::string> statements{"UPDATE models SET note = 'x'",
+                                      "UPDATE models SET parent = id",
+                                      "DELETE FROM models",
+                                      "UPDATE model_bases SET sha256 = 'x'",
+                                      "DELETE FROM model_bases",
+                                      "UPDATE model_recordings SET role = 'test'",
+                                      "DELETE FROM model_recordings",
+                                      GetParam() == "postgresql"
+                                          ? "TRUNCATE models CASCADE"
+                                          : "INSERT OR REPLACE INTO models SELECT * FROM models"};
+  for (const std::string& sql : statements)
+    EXPECT_THAT(error_message([&] { database->run(sql); }), HasSubstr("are kept as they are"))
+        << sql;
+  EXPECT_EQ(registry.model_bytes(kElbow, id), model.bytes);
+  EXPECT_EQ(registry.model(id).base_sha256, "feed");
+  EXPECT_THAT(registry.model(id).recordings, SizeIs(1));
+}
+
 /// What a damaged disk does: triggers of the registry do not keep it from that.
 void damage_model(const StoreAddress& address, std::int64_t id) {
   const auto database = open_database(address);
+  database->run(address.kind == StoreAddress::Kind::postgresql
+                    ? "DROP TRIGGER models_change ON models"
+                    : "DROP TRIGGER models_change");
   auto rows = database->run("SELECT bytes FROM models WHERE id = $1", {id});
   Blob blob = std::get<Blob>(rows.front().front());
   blob.bytes.back() = static_cast<char>(blob.bytes.back() ^ 1);

@@ -108,6 +108,22 @@ TEST_P(OldStore, ProgramsThatUpgradeItAtTheSameTimeDoSoOnce) {
   EXPECT_THAT(StudyStore(address_).studies(), SizeIs(1));
 }
 
+TEST_P(OldStore, ModelsOfVersion2AreKeptAndThenNotChangedAnyMore) {
+  const auto database = open_database(address_);
+  upgrade_schema(*database, "store", 2);
+  database->run("INSERT INTO devices VALUES('J01', 'knee', '', 0)");
+  database->run(
+      "INSERT INTO models(device, sha256, family, file, torsio_version, options, seed, metrics, "
+      "added_at, added_by, note, size, bytes) VALUES('J01', 'feed', 'linear', 'a', '1', '{}', '1', "
+      "'{}', 0, 'robot', '', 1, $1)",
+      {Blob{"\x01"}});
+  database->run("UPDATE models SET note = 'changed by hand'");
+  EXPECT_EQ(upgrade_store(address_).before, 2);
+  EXPECT_EQ(Registry(address_).models("J01").front().note, "changed by hand");
+  EXPECT_THAT(error_message([&] { database->run("UPDATE models SET note = 'again'"); }),
+              HasSubstr("rows of models are kept as they are"));
+}
+
 TEST_P(OldStore, ANewerOneIsNotChanged) {
   upgrade_store(address_);
   open_database(address_)->run("INSERT INTO schema_version VALUES(99, 0, '9.9')");

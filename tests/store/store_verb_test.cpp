@@ -120,6 +120,28 @@ TEST_F(StoreVerb, KeepsTheRecordOfADevice) {
   EXPECT_EQ(json_of("store list --studies").at("studies").size(), 0U);
 }
 
+TEST_F(StoreVerb, ShowsFromWhichModelOneWasTransferred) {
+  done(
+      "fleet calibrate --specimens 'dfki-50#0001..#0002' --model linear --store line.sqlite "
+      "--promote");
+  const auto first = json_of("store show 'dfki-50#0001' --store line.sqlite");
+  const auto second = json_of("store show 'dfki-50#0002' --store line.sqlite");
+  const std::string sha256 = first.at("models").at(0).at("sha256");
+  EXPECT_TRUE(first.at("models").at(0).at("base_sha256").is_null());
+  EXPECT_EQ(second.at("models").at(0).at("base_sha256"), sha256);
+  EXPECT_THAT(done("store show 'dfki-50#0002' --store line.sqlite"),
+              HasSubstr("base of model 2: model 1 (linear) of dfki-50#0001, SHA-256 " +
+                        sha256.substr(0, 12)));
+
+  // A base that is a file alone.
+  done("store export 'dfki-50#0001' --store line.sqlite -o base.safetensors");
+  done(
+      "fleet calibrate --specimens 'dfki-50#0002..#0002' --model linear --base base.safetensors "
+      "--store other.sqlite --promote");
+  EXPECT_THAT(done("store show 'dfki-50#0002' --store other.sqlite"),
+              HasSubstr("base of model 1: a file that is not in this store, SHA-256 " + sha256));
+}
+
 TEST_F(StoreVerb, RefusesFilesOfOtherDevices) {
   done("store add elbow linear.safetensors --recordings a.csv");
   expect_refusal("store add elbow polynomial.safetensors knee.safetensors", kWorkFailed,
@@ -165,8 +187,8 @@ TEST_F(StoreVerb, UpgradesAnOldStoreOnlyWhenAsked) {
   for (const char* call : {"store list", "work", "store add elbow linear.safetensors"})
     expect_refusal(std::string(call) + " --store old.sqlite", kWorkFailed,
                    "torsio store upgrade --store 'old.sqlite'");
-  EXPECT_THAT(done("store upgrade --store old.sqlite"), HasSubstr("from version 1 to 2"));
-  EXPECT_THAT(done("store upgrade --store old.sqlite"), HasSubstr("of version 2 already"));
+  EXPECT_THAT(done("store upgrade --store old.sqlite"), HasSubstr("from version 1 to 3"));
+  EXPECT_THAT(done("store upgrade --store old.sqlite"), HasSubstr("of version 3 already"));
   EXPECT_EQ(json_of("store list --studies --store old.sqlite").at("studies").at(0).at("finished"),
             2);
 }

@@ -12,9 +12,9 @@
 #include "common/report_output.hpp"
 #include "fleet/calibration.hpp"
 #include "fleet/fleet_text.hpp"
+#include "fleet/registration.hpp"
 #include "fleet/watch.hpp"
 #include "fleet/watch_text.hpp"
-#include "search/specimen_study.hpp"
 #include "search/study_flags.hpp"
 #include "store/store_flags.hpp"
 #include "torsio/core/error.hpp"
@@ -23,14 +23,8 @@
 namespace {
 
 struct CalibrateFlags {
-  std::string list;
-  std::string specimens;
-  std::size_t faults = 0;
-  std::string base;
-  std::string model;
-  std::uint64_t seed = kDefaultSeed;
+  torsio::FleetChoice fleet;
   bool promotes = false;
-  bool only_compares = false;
   WorkerFlags worker;
   JsonOutput json;
   std::string pages;
@@ -38,32 +32,10 @@ struct CalibrateFlags {
 
 struct WatchFlags {
   std::string list;
+  std::size_t threads = 0;
   StoreFlags store;
   ReportOutput report;
 };
-
-torsio::CalibrationRequest request_of(const CalibrateFlags& flags) {
-  if (flags.list.empty() == flags.specimens.empty())
-    throw torsio::UsageError({.place = "torsio fleet calibrate",
-                              .expected = "a list of joints, or --specimens",
-                              .found = flags.list.empty() ? "neither" : "both",
-                              .advice = "torsio fleet calibrate robot.yaml"});
-  torsio::CalibrationRequest request;
-  if (!flags.list.empty()) {
-    request = torsio::read_fleet_list(flags.list);
-  } else {
-    const torsio::SpecimenRequest range = torsio::specimen_range(flags.specimens);
-    request.simulated = {.actuator = range.actuator,
-                         .first = range.first,
-                         .last = range.last,
-                         .faults = flags.faults};
-  }
-  if (!flags.base.empty()) request.base = flags.base;
-  if (!flags.model.empty()) request.model = flags.model;
-  request.seed = flags.seed;
-  request.only_compares = flags.only_compares;
-  return request;
-}
 
 bool is_kept(const CalibrateFlags& flags) {
   return !flags.worker.store.empty() || !flags.worker.study.empty();
@@ -72,7 +44,7 @@ bool is_kept(const CalibrateFlags& flags) {
 torsio::StoreAddress address_of(const CalibrateFlags& flags) {
   if (!is_kept(flags)) return {};
   if (!flags.worker.store.empty()) return torsio::store_address(flags.worker.store);
-  const auto folder = std::filesystem::path(flags.list).parent_path();
+  const auto folder = std::filesystem::path(flags.fleet.list).parent_path();
   return torsio::store_address((folder / "torsio-studies.sqlite").string());
 }
 
@@ -105,8 +77,8 @@ void register_joints(const CalibrateFlags& flags, torsio::StudyStore& store,
 }
 
 void calibrate(CalibrateFlags& flags) {
-  const torsio::CalibrationRequest request = request_of(flags);
-  if (flags.promotes && flags.only_compares)
+  const torsio::CalibrationRequest request = torsio::calibration_request(flags.fleet);
+  if (flags.promotes && flags.fleet.only_compares)
     throw torsio::UsageError(
         {.place = "--promote",
          .problem = "--only-compare makes no models that could become current"});
@@ -117,14 +89,14 @@ void calibrate(CalibrateFlags& flags) {
   torsio::CalibrationStudy kind(request);
   torsio::StudyStore store(address_of(flags), wait_for_server);
   const std::string name = flags.worker.study.empty() ? "calibrate" : flags.worker.study;
-  const torsio::StoredStudy study = torsio::begin_calibration(store, name, request, kind);
+  const torsio::StoredStudy study = torsio::begin_calibration(store, name, kind);
   take_back_of_dead(store, study);
   ProgressBar progress;
   torsio::run_workers(store, study, kind, flags.worker.options(), progress.listener());
   const torsio::FleetCalibration fleet = torsio::calibration_result(store, study);
   flags.json.write(torsio::fleet_json(fleet));
   if (flags.json.wants_tables()) print(torsio::fleet_text(fleet));
-  if (is_kept(flags)) register_joints(flags, store, fleet, request);
+  if (is_kept(flags)) register_joints(flags, store, fleet, kind.request());
   if (!flags.pages.empty()) write_pages(flags.pages, fleet);
 }
 
@@ -135,8 +107,8 @@ void watch(WatchFlags& flags) {
   std::vector<std::string> failures;
   if (!flags.list.empty()) {
     ProgressBar progress;
-    failures =
-        torsio::watch_joints(*registry, torsio::read_fleet_list(flags.list), progress.listener());
+    failures = torsio::watch_joints(*registry, torsio::read_fleet_list(flags.list), flags.threads,
+                                    progress.listener());
   }
   const std::vector<torsio::WatchedJoint> joints = torsio::rank_by_drift(*registry);
   flags.store.json.write(torsio::watch_json(joints, failures));
@@ -162,22 +134,22 @@ void add_fleet(CLI::App& app) {
       "calibrate",
       "check, compare, transfer, fit and evaluate each joint; report those that differ");
   part->footer("Example: torsio fleet calibrate robot.yaml --store robot.sqlite --report pages");
-  part->add_option("LIST", calibration->list, "joints with their recordings (docs/fleet.md)");
-  part->add_option("--specimens", calibration->specimens,
+  part->add_option("LIST", calibration->fleet.list, "joints with their recordings (docs/fleet.md)");
+  part->add_option("--specimens", calibration->fleet.specimens,
                    "in place of a list: simulated specimens with their tolerances: "
                    "dfki-50#0001..#1000");
-  part->add_option("--faults", calibration->faults,
+  part->add_option("--faults", calibration->fleet.faults,
                    "so many of the specimens get a fault of production");
-  part->add_option("--base", calibration->base,
+  part->add_option("--base", calibration->fleet.base,
                    "model file that the joints are compared with and start from (default: the "
                    "list's, else for each type a model of its first joint)");
-  part->add_option("--model", calibration->model, "family to fit (default grey_box)");
-  add_seed(*part, calibration->seed, "seed of the fits and of the simulation");
+  part->add_option("--model", calibration->fleet.model, "family to fit (default grey_box)");
+  add_seed(*part, calibration->fleet.seed, "seed of the fits and of the simulation");
   calibration->worker.add(*part,
                           "SQLite file or postgresql:// URL that keeps study, joints and models "
                           "(default: torsio-studies.sqlite beside the list, if --study is given)",
                           "name of the study (default calibrate)");
-  part->add_flag("--only-compare", calibration->only_compares,
+  part->add_flag("--only-compare", calibration->fleet.only_compares,
                  "make no models: only find the joints that differ, as at the end of a production "
                  "line");
   part->add_flag("--promote", calibration->promotes,
@@ -195,6 +167,10 @@ void add_fleet(CLI::App& app) {
   part->footer("Example: torsio fleet watch today.yaml --store robot.sqlite");
   part->add_option("LIST", watching->list,
                    "joints with their recordings of today; without it, the history is ranked");
+  part->add_option("--threads", watching->threads,
+                   "joints that are compared at the same time; the result does not depend on it "
+                   "(default: one for each core that this process may use)")
+      ->check(CLI::Range(0, 1024));
   watching->store.add(*part, "write the result as JSON to a file, or - for standard output");
   watching->report.add(*part);
   part->callback([watching] { watch(*watching); });

@@ -4,10 +4,12 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "common/data_flags.hpp"
@@ -94,11 +96,16 @@ void show_device(const StoreShowFlags& flags) {
   DeviceRecord record{.device = registry->device(flags.serial),
                       .models = registry->models(flags.serial),
                       .lineage = {},
+                      .bases = {},
                       .recordings = registry->recordings(flags.serial),
                       .promotions = registry->promotions(flags.serial),
                       .drift = registry->drift_history(flags.serial)};
   if (const auto current = registry->current(flags.serial))
     record.lineage = registry->lineage(current->id);
+  std::set<std::string> bases;
+  for (const torsio::RegisteredModel& model : record.models) bases.insert(model.base_sha256);
+  for (const std::string& sha256 : bases)
+    if (auto base = registry->model_of_file(sha256)) record.bases.push_back(std::move(*base));
   if (flags.json.wants_tables()) print(device_text(record));
   flags.json.write(torsio::json_text(store_json(record)));
 }

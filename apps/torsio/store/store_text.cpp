@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <filesystem>
@@ -49,6 +50,16 @@ std::string id_text(const std::optional<std::int64_t>& id) {
 }
 /// Enough of a hash to find it again.
 std::string short_hash(const std::string& sha256) { return sha256.substr(0, 12); }
+
+/// The model from whose file another one was transferred.
+std::string base_text(const torsio::RegisteredModel& model,
+                      std::span<const torsio::RegisteredModel> bases) {
+  const auto base = std::ranges::find(bases, model.base_sha256, &torsio::RegisteredModel::sha256);
+  return base == bases.end()
+             ? fmt::format("a file that is not in this store, SHA-256 {}", model.base_sha256)
+             : fmt::format("model {} ({}) of {}, SHA-256 {}", base->id, base->family, base->device,
+                           short_hash(base->sha256));
+}
 
 std::string promotions_text(std::span<const torsio::Promotion> promotions) {
   torsio::TextTable table;
@@ -126,14 +137,15 @@ std::string models_text(std::span<const torsio::RegisteredModel> models, bool wi
   torsio::TextTable table;
   table.header({"model"});
   if (with_device) table.header({"device"});
-  table.header({"family", "RMSE", "parent", "added (UTC)", "by", "file", "SHA-256", "note"});
+  table.header(
+      {"family", "RMSE", "parent", "base", "added (UTC)", "by", "file", "SHA-256", "note"});
   for (const torsio::RegisteredModel& each : models) {
     std::vector<std::string> row{fmt::format("{}", each.id)};
     if (with_device) row.push_back(each.device);
-    row.insert(row.end(),
-               {each.family, rmse_of(each), id_text(each.parent), minute_of(each.added_at_s),
-                each.added_by, std::filesystem::path(each.file).filename().string(),
-                short_hash(each.sha256), each.note});
+    row.insert(row.end(), {each.family, rmse_of(each), id_text(each.parent),
+                           short_hash(each.base_sha256), minute_of(each.added_at_s), each.added_by,
+                           std::filesystem::path(each.file).filename().string(),
+                           short_hash(each.sha256), each.note});
     table.row(std::move(row));
   }
   return table.text();
@@ -164,6 +176,9 @@ std::string device_text(const DeviceRecord& record) {
       steps.push_back(fmt::format("model {} ({}{})", each.id, each.family,
                                   each.device == device.serial ? "" : " of " + each.device));
     text += fmt::format("current: {}\n", fmt::join(steps, ", made from "));
+    for (const torsio::RegisteredModel& each : record.lineage)
+      if (!each.base_sha256.empty())
+        text += fmt::format("base of model {}: {}\n", each.id, base_text(each, record.bases));
   }
   if (!record.models.empty()) text += "\nmodels\n" + models_text(record.models, false);
   if (!record.promotions.empty()) text += "\npromotions\n" + promotions_text(record.promotions);
@@ -194,6 +209,7 @@ Json store_json(const torsio::RegisteredModel& model) {
           {"seed", model.seed},
           {"metrics", model.metrics},
           {"parent", model.parent ? Json(*model.parent) : Json()},
+          {"base_sha256", model.base_sha256.empty() ? Json() : Json(model.base_sha256)},
           {"trial", model.trial ? Json(*model.trial) : Json()},
           {"added", json_of_time(model.added_at_s)},
           {"by", model.added_by},

@@ -11,8 +11,10 @@
 struct DeviceRecord {
   torsio::RegisteredDevice device;
   std::vector<torsio::RegisteredModel> models;
-  std::vector<torsio::RegisteredModel>
-      lineage;  ///< the current model and those that it was made from
+  /// The current model and those that it was made from.
+  std::vector<torsio::RegisteredModel> lineage;
+  /// Models of the registry, of any device, from whose files models of this one were transferred.
+  std::vector<torsio::RegisteredModel> bases;
   std::vector<torsio::RegisteredRecording> recordings;
   std::vector<torsio::Promotion> promotions;
   std::vector<torsio::DriftEntry> drift;

@@ -53,8 +53,9 @@ struct NewModel {
   std::vector<RecordingUse> recordings = {};  ///< besides the training files on its card
   std::optional<std::int64_t> parent = {};    ///< the model that it was made from
   std::optional<std::int64_t> trial = {};     ///< the trial of a study that found it
+  /// Hash of the model file that it was transferred from, which need not be in the registry; may be empty.
+  std::string base_sha256 = {};
 };
-
 /// A model of the registry. The file itself is read by `model_bytes`.
 struct RegisteredModel {
   std::int64_t id = 0;
@@ -71,7 +72,8 @@ struct RegisteredModel {
   double added_at_s = kNotMeasured;
   std::string added_by = {};
   std::string note = {};
-  std::size_t size = 0;  ///< number of bytes of the file
+  std::size_t size = 0;          ///< number of bytes of the file
+  std::string base_sha256 = {};  ///< as `NewModel::base_sha256`
   std::vector<RecordingUse> recordings = {};
 };
 
@@ -121,14 +123,12 @@ struct RegistryFinding {
   std::string text;
 };
 
-/// Devices with their recordings, models and drift, in the database of a `StudyStore`. A model is that of
-/// one device; a device has at most one current model, which is one of its own. Promotions and drift
-/// are only added, never changed.
+/// Devices with their recordings, models and drift, in the database of a `StudyStore`. A model is that of one device; a
+/// device has at most one current model, which is one of its own. Models, promotions and drift are only added.
 ///
-/// Threads and a server that is lost: as `StudyStore`. Each function is one transaction, which has one
-/// effect also if it is repeated.
-/// @throws Error for what a function refuses, UsageError for an unknown device or model, with the nearest
-/// name; as the database does.
+/// Threads and a server that is lost: as `StudyStore`. Each function is one transaction, which has one effect also if
+/// it is repeated.
+/// @throws Error for what a function refuses, UsageError for an unknown device or model, with the nearest name.
 class Registry {
  public:
   /// Opens or creates the store. @throws Error also for a store of another version.
@@ -146,20 +146,20 @@ class Registry {
   [[nodiscard]] std::vector<RegisteredDevice> devices();
   [[nodiscard]] std::vector<DeviceSummary> summaries();
 
-  /// Adds a recording, or the device, the path and the size of one that is there.
-  /// @throws Error if it is one of another device.
+  /// Adds a recording, or what was not known of one that is there. @throws Error if it is one of another device.
   void add_recording(const RegisteredRecording& recording);
   /// @param serial empty: of all devices
   [[nodiscard]] std::vector<RegisteredRecording> recordings(std::string_view serial = {});
 
-  /// @returns its number; of one that is there already, that one. @throws Error if the file is not a
-  /// model of this device.
+  /// @returns its number, also of one that is there already. @throws Error if the file is not a model of this device.
   std::int64_t add_model(const NewModel& model);
   [[nodiscard]] RegisteredModel model(std::int64_t id);
   /// @param serial empty: of all devices
   [[nodiscard]] std::vector<RegisteredModel> models(std::string_view serial = {});
   /// The model, the one that it was made from, and so on.
   [[nodiscard]] std::vector<RegisteredModel> lineage(std::int64_t id);
+  /// A model whose file has this hash, of any device; of several the one that was added first.
+  [[nodiscard]] std::optional<RegisteredModel> model_of_file(std::string_view sha256);
   /// The file as it was added. @throws Error if its hash is another one, or if it is of another device.
   [[nodiscard]] std::string model_bytes(std::string_view serial, std::int64_t id);
 
@@ -167,8 +167,8 @@ class Registry {
   /// @throws UsageError if it is a model of another device.
   bool promote(std::string_view serial, std::int64_t model, std::string_view by,
                std::string_view reason = {});
-  /// Makes the model current that was so before the current one was promoted; again, the one before
-  /// that. @returns its number. @throws Error if there was none.
+  /// Makes the model current that was so before the current one was promoted; again, the one before that.
+  /// @returns its number. @throws Error if there was none.
   std::int64_t roll_back(std::string_view serial, std::string_view by,
                          std::string_view reason = {});
   [[nodiscard]] std::optional<RegisteredModel> current(std::string_view serial);
