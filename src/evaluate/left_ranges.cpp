@@ -86,14 +86,14 @@ std::vector<std::string> left_range_warnings(const EstimatorSettings& settings,
     const InputCourse& course = courses.inputs[j];
     const double share = static_cast<double>(course.outside) / static_cast<double>(courses.samples);
     if (!(share >= kRareShare)) continue;
+    const std::string_view unused = reason_to_leave_out(settings, model, j);
     warnings.push_back(fmt::format(
         "{} is {:.3g} to {:.3g} here and was {:.3g} to {:.3g} in training: outside in {:.1f} % of "
         "the samples, which a guard reports; {}",
         settings.features.inputs[j], course.lowest, course.highest, trained.lowest[j],
         trained.highest[j], 100.0 * share,
-        is_without_effect(model, j)
-            ? "it has no effect on this model: fit again with --inputs, without it"
-        : has_offset ? "remove the offset first, then evaluate again"
+        !unused.empty() ? fmt::format("it {}: fit again with --inputs, without it", unused)
+        : has_offset    ? "remove the offset first, then evaluate again"
                      : advice(course, trained.lowest[j], trained.highest[j], pipeline.is_rate(j))));
   }
   return warnings;

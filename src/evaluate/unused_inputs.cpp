@@ -27,4 +27,11 @@ bool is_without_effect(const AnyModel& model, std::size_t input) {
          is_zero(coefficients.values, terms.first_coulomb() + input);
 }
 
+std::string_view reason_to_leave_out(const EstimatorSettings& settings, const AnyModel& model,
+                                     std::size_t input) {
+  if (input > 0 && settings.ranges.lowest[input] == settings.ranges.highest[input])
+    return "was constant in the training";
+  return is_without_effect(model, input) ? "has no effect on this model" : "";
+}
+
 }  // namespace torsio

@@ -78,5 +78,22 @@ TEST(UnusedInputs, AreThoseOfAGreyBoxWhoseCoefficientsAre0) {
               testing::Contains(HasSubstr("it has no effect on this model: fit again")));
 }
 
+TEST(UnusedInputs, AreThoseThatWereConstantInTheTrainingOfAnyFamily) {
+  const Dataset dataset = test::bench_dataset();
+  for (const char* family : {"linear", "polynomial", "maxwell_slip"}) {
+    ModelFile file = trained(dataset, family).file;
+    const std::size_t last = file.settings.features.inputs.size() - 1;
+    ASSERT_GT(last, 0U);
+    const AnyModel model(file.parameters);
+    EXPECT_EQ(reason_to_leave_out(file.settings, model, last), "") << family;
+    file.settings.ranges.lowest[last] = file.settings.ranges.highest[last] = 0.0;
+    EXPECT_EQ(reason_to_leave_out(file.settings, model, last), "was constant in the training")
+        << family;
+    EXPECT_THAT(left_range_warnings(file.settings, model, dataset),
+                testing::Contains(HasSubstr("it was constant in the training: fit again with")))
+        << family;
+  }
+}
+
 }  // namespace
 }  // namespace torsio

@@ -75,6 +75,29 @@ TEST_F(FollowedAdvice, ASpringThatDoesNotLastLastsWithTheOptionsOfTheNote) {
   }
 }
 
+TEST_F(FollowedAdvice, AnInputThatWasConstantIsLeftOutAndGuardsNoLonger) {
+  expect_done("simulate dfki-50 sweep --duration 20s --lever 0.24m -o plain.csv");
+  const std::string with = "awk -F, -v OFS=, 'NR == 1 { print $0, \"oil_K\" } NR > 1 { print $0, ";
+  ASSERT_EQ(
+      shell(with + "300 }' plain.csv > a.csv; " + with + "305 }' plain.csv > warm.csv").exit_code,
+      0);
+  const Outcome fitted = torsio(
+      "fit a.csv --model grey_box --inputs 'gear_angle_rad - joint_angle_rad, oil_K' -o "
+      "m.safetensors");
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  EXPECT_THAT(fitted.err, HasSubstr("oil_K was constant in the training, but a guard reports"));
+  EXPECT_THAT(torsio("evaluate m.safetensors warm.csv").out,
+              HasSubstr("it was constant in the training: fit again with --inputs, without it"));
+  const std::string words = "leave it out with  ";
+  const std::size_t begin = fitted.err.find(words);
+  ASSERT_NE(begin, std::string::npos) << fitted.err;
+  const std::string option =
+      fitted.err.substr(begin + words.size(), fitted.err.find('\n', begin) - begin - words.size());
+  expect_done("fit a.csv --model grey_box " + option + " -o n.safetensors");
+  EXPECT_THAT(torsio("evaluate n.safetensors warm.csv --json -").out,
+              Not(HasSubstr("\"warnings\"")));
+}
+
 TEST_F(FollowedAdvice, CountsOfAModelsMappingAreTakenForTheC99Program) {
   expect_done("simulate dfki-50 sweep --duration 20s --lever 0.24m -o a.csv");
   // Counts of a motor encoder before a gear of 80.

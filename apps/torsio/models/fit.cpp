@@ -141,17 +141,17 @@ void remark_inputs_without_effect(const torsio::ModelFile& file) {
   std::vector<std::string> without;
   std::string others;
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    if (torsio::is_without_effect(model, i))
-      without.push_back(inputs[i]);
+    const std::string_view reason = torsio::reason_to_leave_out(file.settings, model, i);
+    if (!reason.empty())
+      without.push_back(fmt::format("{} {}", inputs[i], reason));
     else
       others += (others.empty() ? "" : ",") + inputs[i];
   }
+  const bool are_many = without.size() > 1;
   if (!without.empty())
     remark(fmt::format(
-        "{} {} no effect on this model, but a guard reports where {} range is left: "
-        "leave {} out with  --inputs '{}'",
-        fmt::join(without, " and "), without.size() > 1 ? "have" : "has",
-        without.size() > 1 ? "their" : "its", without.size() > 1 ? "them" : "it", others));
+        "{}, but a guard reports where {} range is left: leave {} out with  --inputs '{}'",
+        fmt::join(without, " and "), are_many ? "their" : "its", are_many ? "them" : "it", others));
 }
 
 void run(FitFlags& flags) {
