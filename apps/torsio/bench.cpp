@@ -82,7 +82,6 @@ void add_bench(CLI::App& app) {
   verb->add_option("--models", flags->models, "as for compare")->capture_default_str();
   verb->add_option("--actuator", flags->actuator, "the simulated bench")->capture_default_str();
   verb->add_option("--loop-rate", flags->rate, "rate of the loop")->capture_default_str();
-  verb->add_option("--json", flags->json.destination,
-                   "write the times as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the times");
   verb->callback([flags] { run(*flags); });
 }

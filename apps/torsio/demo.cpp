@@ -102,9 +102,7 @@ void add_demo(CLI::App& app) {
   verb->add_option("--models", flags->models, "as for compare")->capture_default_str();
   verb->add_option("-o,--output", flags->output, "file of the best model")->capture_default_str();
   add_seed(*verb, flags->seed, "seed of the random number generators");
-  verb->add_option(
-      "--json", flags->json.destination,
-      "write the results of the comparison as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results of the comparison");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

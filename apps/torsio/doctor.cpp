@@ -156,7 +156,6 @@ void add_doctor(CLI::App& app) {
                                       "permissions, memory, browser, other programs");
   verb->footer("Example: torsio doctor");
   auto json = std::make_shared<JsonOutput>();
-  verb->add_option("--json", json->destination,
-                   "write the table as JSON to a file, or - for standard output");
+  json->add(*verb, "the table");
   verb->callback([json] { run(*json); });
 }

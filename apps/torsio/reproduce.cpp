@@ -280,8 +280,7 @@ void add_reproduce(CLI::App& app) {
   verb->add_option("--repeats", flags->options.repeats, "repeats with different seeds")
       ->capture_default_str();
   add_seed(*verb, flags->options.seed, "seed of the first repeat");
-  verb->add_option("--json", flags->json.destination,
-                   "write the figures as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the figures");
   verb->add_option("--plot", flags->plot,
                    "draw the figure of an experiment that has one: SVG, PNG or PDF");
   flags->report.add_page(*verb);

@@ -332,8 +332,7 @@ void add_arm(CLI::App& app) {
   verb->add_flag("--truth", flags->with_truth, "add the truth_ channels, which no sensor measures");
   verb->add_flag("--describe", flags->is_described,
                  "show the joints, their actuators and the largest torques of gravity");
-  verb->add_option("--json", flags->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the result");
   flags->report.add(*verb);
   add_arm_calibrate(*verb);
   add_arm_excite(*verb);

@@ -163,7 +163,6 @@ void add_arm_calibrate(CLI::App& arm) {
       ->capture_default_str();
   verb->add_option("--links-com", flags->links_com,
                    "distance by which the centre of mass of each link may differ (default: 2mm)");
-  verb->add_option("--json", flags->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the result");
   verb->callback([flags] { calibrate_arm(*flags); });
 }

@@ -110,7 +110,6 @@ void add_arm_excite(CLI::App& arm) {
   verb->add_option("--tilt", flags->tilt,
                    "tilt of the base about its y axis, in place of that of the arm's file: 30deg");
   add_seed(*verb, flags->spec.seed, "seed of the poses");
-  verb->add_option("--json", flags->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the result");
   verb->callback([flags] { excite(*flags); });
 }

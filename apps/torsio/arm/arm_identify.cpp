@@ -328,7 +328,6 @@ void add_arm_identify(CLI::App& arm) {
                    "with --links: recordings of other moves, on which the torques are compared");
   verb->add_option("-o,--output", flags->output,
                    "text file for the line 'payload' of the arm's YAML file");
-  verb->add_option("--json", flags->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the result");
   verb->callback([flags] { identify(*flags); });
 }

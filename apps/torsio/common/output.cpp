@@ -28,6 +28,11 @@ void remark_note(std::string_view note) {
   remark(note.starts_with("warning: ") ? std::string(note) : "note: " + std::string(note));
 }
 
+void JsonOutput::add(CLI::App& verb, std::string_view what) {
+  verb.add_option("--json", destination,
+                  fmt::format("write {} as JSON to a file, or - for standard output", what));
+}
+
 void JsonOutput::write(std::string_view document) const {
   if (destination.empty()) return;
   write_text(destination, document);

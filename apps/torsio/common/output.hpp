@@ -1,5 +1,6 @@
 #pragma once
 
+#include <CLI/App.hpp>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -12,6 +13,8 @@
 struct JsonOutput {
   std::string destination;  ///< empty: none; "-": standard output
 
+  /// @param what the document contains: "the scores"
+  void add(CLI::App& verb, std::string_view what);
   /// Text tables are printed to stdout unless the document is.
   [[nodiscard]] bool wants_tables() const { return !is_standard_output(destination); }
   /// @throws torsio::Error if the document cannot be written completely.

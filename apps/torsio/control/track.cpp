@@ -408,8 +408,7 @@ void add_track(CLI::App& app) {
   verb->add_option("-o,--output,--record", flags->record,
                    "write all signals of the loop and each term of its command in the first run of "
                    "the only --model as CSV");
-  verb->add_option("--json", flags->json.destination,
-                   "write the results as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results");
   flags->report.add(*verb);
   flags->impedance.add(*verb);
   verb->callback([flags, verb] { run(*flags, *verb); });

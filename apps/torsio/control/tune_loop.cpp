@@ -287,8 +287,7 @@ void add_tune_loop(CLI::App& app) {
                    "largest torque that pulls at the joint at rest, for the stop in that file")
       ->capture_default_str();
   verb->add_flag("--overwrite", flags->overwrite, "replace the file if it exists");
-  verb->add_option("--json", flags->json.destination,
-                   "write the results as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results");
   flags->report.add(*verb, "magnitude");
   verb->callback([flags] { run(*flags); });
 }

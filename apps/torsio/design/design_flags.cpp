@@ -8,8 +8,7 @@
 #include "torsio/sim/bench/sheet_file.hpp"
 
 void DesignOutputs::add(CLI::App& verb, bool has_dxf, const std::string& preferred_figure) {
-  verb.add_option("--json", json.destination,
-                  "write the design as JSON to a file, or - for standard output");
+  json.add(verb, "the design");
   verb.add_option("--yaml", yaml, "write the design as YAML to a file");
   if (preferred_figure.empty())
     report.add_page(verb);

@@ -67,8 +67,7 @@ void ConnectFlags::add_line(CLI::App& verb) {
       ->capture_default_str();
   verb.add_flag("--lenient", is_lenient,
                 "accept also frames that only the public parser of NDLCom accepts");
-  verb.add_option("--json", json.destination,
-                  "write the result as JSON to a file, or - for standard output");
+  json.add(verb, "the result");
 }
 
 void ConnectFlags::add_bridge(CLI::App& verb) {

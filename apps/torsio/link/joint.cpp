@@ -311,7 +311,6 @@ void add_joint(CLI::App& app) {
       "--gear-stage", flags->has_gear_stage,
       "with the elasticity of the gears, which takes twice the time; else rotor and gear "
       "output turn together");
-  verb->add_option("--json", flags->json.destination,
-                   "write the summary as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the summary");
   verb->callback([flags, verb] { run(*flags, *verb); });
 }

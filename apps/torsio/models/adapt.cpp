@@ -123,8 +123,7 @@ void add_adapt(CLI::App& app) {
                    "adapted model file; untouched unless all else succeeds");
   verb->add_option("--device-serial", flags->device_serial,
                    "serial number of the joint that the adapted model belongs to");
-  verb->add_option("--json", flags->json.destination,
-                   "write the results as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -107,8 +107,7 @@ void add_attribute(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   add_seed(*verb, flags->options.seed, "seed of the random number generators");
-  verb->add_option("--json", flags->json.destination,
-                   "write the results as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -124,8 +124,7 @@ void add_crossvalidate(CLI::App& app) {
   add_seed(*verb, flags->seed, "seed of the random number generators");
   verb->add_flag("--allow-leak", flags->allow_leak,
                  "accept an input that the target was computed from; the results are marked");
-  verb->add_option("--json", flags->json.destination,
-                   "write the results as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

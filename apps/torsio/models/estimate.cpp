@@ -75,8 +75,7 @@ void add_estimate(CLI::App& app) {
   flags->data.add_model_mapping(*verb);
   verb->add_option("-o,--output", flags->output,
                    "CSV file to write, compressed if it ends in .gz; - for standard output");
-  verb->add_option("--json", flags->json.destination,
-                   "write the summary as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the summary");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -145,8 +145,7 @@ void add_evaluate(CLI::App& app) {
   flags->data.add_initialise(*verb);
   verb->add_option("-o,--output,--predictions", flags->predictions,
                    "write target, estimate, error bar and fault of one recording as CSV");
-  verb->add_option("--json", flags->json.destination,
-                   "write the results as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -182,7 +182,6 @@ void add_export(CLI::App& app) {
       "--clock", flags->clock,
       "clock of the target: 168MHz; refused if a step takes more than half of a period");
   verb->add_flag("--overwrite", flags->overwrite, "replace files that exist");
-  verb->add_option("--json", flags->json.destination,
-                   "write names and costs as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "names and costs");
   verb->callback([verb, flags] { run_export(*verb, *flags); });
 }

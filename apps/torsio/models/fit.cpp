@@ -237,8 +237,7 @@ void add_fit(CLI::App& app) {
   verb->add_flag("--resume", flags->resume,
                  "continue from <output>.checkpoint, which a stopped fit of a network writes");
   verb->add_flag("--list", flags->list, "show the families and their settings");
-  verb->add_option("--json", flags->json.destination,
-                   "write the scores as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the scores");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

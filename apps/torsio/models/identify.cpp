@@ -277,8 +277,7 @@ void add_identify(CLI::App& app) {
   verb->add_option("--drive", flags->drive, "file of the drive's law; default: by the channels");
   add_fit_options(*verb, *flags);
   add_output_options(*verb, *flags);
-  verb->add_option("--json", flags->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the result");
   flags->report.add(*verb, "Mean |error");
   exclude_from(*verb, *from);
   verb->callback([flags] { run(*flags); });

@@ -145,7 +145,6 @@ void add_import(CLI::App& app) {
                    "model file; untouched unless the import succeeds");
   verb->add_option("--device-serial", flags->device_serial,
                    "serial number of the joint that the model belongs to");
-  verb->add_option("--json", flags->json.destination,
-                   "write the model's description as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the model's description");
   verb->callback([flags] { run(*flags); });
 }

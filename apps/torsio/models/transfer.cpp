@@ -147,8 +147,7 @@ void add_transfer(CLI::App& app) {
                    "model file of the new joint; untouched unless all else succeeds");
   verb->add_option("--device-serial", flags->device_serial, "serial number of the new joint");
   add_seed(*verb, flags->seed, "of the fit to the new data alone");
-  verb->add_option("--json", flags->json.destination,
-                   "write the results as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the results");
   flags->report.add(*verb, "Error over the time of the new data");
   verb->callback([flags] { run(*flags); });
 }

@@ -235,8 +235,7 @@ void add_check(CLI::App& app) {
           "speed (of the first input) or a condition (default: the range of the "
           "recordings)")
       ->allow_extra_args(false);
-  verb->add_option("--json", flags->json.destination,
-                   "write the findings as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the findings");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

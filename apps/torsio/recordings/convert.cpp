@@ -79,7 +79,6 @@ void add_convert(CLI::App& app) {
           "-o,--output", flags->output,
           fmt::format("file to write; its ending names the format: {}", torsio::kRecordingEndings))
       ->required();
-  verb->add_option("--json", flags->json.destination,
-                   "write the contents of the file as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the contents of the file");
   verb->callback([flags] { run(*flags); });
 }

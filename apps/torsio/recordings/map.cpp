@@ -135,7 +135,6 @@ void add_map(CLI::App& app) {
       "-o,--output", flags->output,
       "mapping to write, .yaml (default: standard output, the table on standard error)");
   verb->add_flag("--yes", flags->yes, "do not ask: take the best guesses, which the draft marks");
-  verb->add_option("--json", flags->json.destination,
-                   "write guesses and mapping as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "guesses and mapping");
   verb->callback([flags] { run(*flags); });
 }

@@ -378,9 +378,7 @@ void add_simulate(CLI::App& app) {
   verb->add_option("--yaml", flags->yaml,
                    "with --describe: write the data sheet as YAML to a file, or - for standard "
                    "output; simulate and track take it as an actuator");
-  verb->add_option("--json", flags->json.destination,
-                   "write the description of the recording, or the list, as JSON to a file, or - "
-                   "for standard output");
+  flags->json.add(*verb, "the description of the recording, or the list,");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -120,8 +120,7 @@ void add_drift(CLI::App& app) {
       "--resume", flags->settings.resume,
       "file that keeps the results of the campaign, so that an interrupted one continues");
   add_seed(*verb, flags->settings.seed, "seed of the campaign");
-  verb->add_option("--json", flags->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the result");
   flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

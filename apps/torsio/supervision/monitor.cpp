@@ -281,8 +281,7 @@ void add_monitor(CLI::App& app) {
   verb->add_flag("--electrical", campaign.is_electrical,
                  "the motors have windings, an inverter and current control");
   add_seed(*verb, simulated.seed, "of the work of simulated joints, and of a campaign");
-  verb->add_option("--json", flags->json.destination,
-                   "write the result as JSON to a file, or - for standard output");
+  flags->json.add(*verb, "the result");
   flags->report.add(*verb);
   verb->callback([flags, verb] { run(*verb, *flags); });
 }
