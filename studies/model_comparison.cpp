@@ -12,6 +12,7 @@
 
 #include "comparison_cases.hpp"
 #include "studies.hpp"
+#include "study_models.hpp"
 #include "study_rows.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/families.hpp"
@@ -19,39 +20,8 @@
 namespace torsio {
 namespace {
 
-/// A model of the table: what its rows are called, and how `--models` asks for it.
-struct Candidate {
-  std::string_view label;
-  std::string_view model;
-  bool is_quick = false;  ///< also in the quick study
-};
-
-// Where a family's own settings would take minutes a case, cheaper ones: fewer starts, samples, epochs.
-constexpr std::array kCandidates{
-    Candidate{"linear", "linear", true},
-    Candidate{"linear_coulomb", "linear_coulomb"},
-    Candidate{"polynomial", "polynomial", true},
-    Candidate{"maxwell_slip", "maxwell_slip", true},
-    Candidate{"prandtl_ishlinskii", "prandtl_ishlinskii"},
-    Candidate{"prandtl_ishlinskii_improved", "prandtl_ishlinskii_improved"},
-    Candidate{"bouc_wen", "bouc_wen"},
-    Candidate{"nonlinear_backlash", "nonlinear_backlash"},
-    Candidate{"nonlinear_backlash_improved", "nonlinear_backlash_improved"},
-    Candidate{"exponential_loading", "exponential_loading"},
-    Candidate{"hammerstein_wiener", "hammerstein_wiener:structure=given:iterations=500", true},
-    Candidate{"viscoelastic", "viscoelastic:network=003a:starts=2"},
-    Candidate{"grey_box", "grey_box", true},
-    Candidate{"grey_box, no residual", "grey_box:residual=none", true},
-    Candidate{"dgmm", "dgmm"},
-    Candidate{"gaussian_process", "gaussian_process:std_dev=false:restarts=0"},
-    Candidate{"parametric_gp", "parametric_gp:updates=5000"},
-    Candidate{"parametric_gp_variational",
-              "parametric_gp_variational:inducing_points=50:samples=1000"},
-    Candidate{"mlp", "mlp"},
-    Candidate{"arx", "arx", true},
-    Candidate{"narx_polynomial", "narx_polynomial:training=one_step"},
-    Candidate{"lstm", "lstm:layers=16:epochs=10:stride=100"},
-};
+using Candidate = ComparedFamily;
+constexpr const auto& kCandidates = kComparedFamilies;
 
 constexpr std::string_view kSubject = "grey_box";
 

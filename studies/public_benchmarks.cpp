@@ -10,19 +10,13 @@
 
 #include "published.hpp"
 #include "studies.hpp"
+#include "study_models.hpp"
 #include "study_rows.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/evaluate/comparison.hpp"
 
 namespace torsio {
 namespace {
-
-struct Entry {
-  std::string_view name;    ///< model name in its rows
-  std::string_view choice;  ///< as `--models` takes it
-  std::string_view quick;   ///< the same for `--quick`; empty: left out
-  bool is_seeded = false;   ///< another seed makes another model: fitted in every repeat
-};
 
 struct Benchmark {
   std::string_view name;
@@ -51,48 +45,6 @@ constexpr Benchmark kEmps{.name = "emps",
                           .rate_Hz = 0.0,
                           .published = kPublishedEmps};
 
-// Settings of the networks: docs/results/benchmarks.md describes how they were selected on the training
-// recording.
-constexpr std::array kBoucWenModels{
-    Entry{"linear", "linear", "linear"},
-    Entry{"arx", "arx", "arx"},
-    Entry{"narx_polynomial, 40 terms", "narx_polynomial:input_lags=5:output_lags=5:terms=40", ""},
-    Entry{
-        "narx_mlp, 16 lags, 128 units",
-        "narx_mlp:input_lags=16:output_lags=16:layers=128:activation=tanh:epochs=1600:learning_"
-        "rate=0.003:learning_rate_schedule=cosine:patience=0:training=noise:feedback_noise=0.01",
-        "narx_mlp:input_lags=16:output_lags=16:layers=16:activation=tanh:epochs=10:training=noise",
-        true},
-    Entry{"lstm, 32 cells",
-          "lstm:layers=32:window=400:stride=40:burn_in=100:epochs=160:learning_rate=0.01:learning_"
-          "rate_schedule=cosine:patience=0",
-          "lstm:layers=4:window=100:stride=100:epochs=1", true},
-    Entry{"gru, 64 cells",
-          "gru:layers=64:window=400:stride=40:burn_in=100:epochs=160:learning_rate=0.005:learning_"
-          "rate_schedule=cosine:patience=0",
-          "gru:layers=4:window=100:stride=100:epochs=1", true},
-    Entry{"dynamic_bouc_wen", "dynamic_bouc_wen", ""},
-    Entry{"dynamic_bouc_wen, input order 5", "dynamic_bouc_wen:input_order=5", ""}};
-
-constexpr std::array kEmpsModels{
-    Entry{"linear", "linear", "linear"},
-    Entry{"arx", "arx", "arx"},
-    Entry{
-        "narx_mlp, 16 lags, 64 units",
-        "narx_mlp:input_lags=16:output_lags=16:layers=64:activation=tanh:epochs=400:learning_rate="
-        "0.003:learning_rate_schedule=cosine:patience=0:training=noise:feedback_noise=0.01",
-        "", true},
-    Entry{"lstm, 32 cells",
-          "lstm:layers=32:window=1000:stride=100:burn_in=100:epochs=40:learning_rate=0.01:learning_"
-          "rate_schedule=cosine:patience=0",
-          "lstm:layers=4:window=100:stride=100:epochs=1", true},
-    Entry{"gru, 32 cells",
-          "gru:layers=32:window=1000:stride=100:burn_in=100:epochs=40:learning_rate=0.01:learning_"
-          "rate_schedule=cosine:patience=0",
-          "", true},
-    Entry{"rigid_drive, 4 numbers", "rigid_drive", "rigid_drive:iterations=50"},
-    Entry{"rigid_drive, terms=auto", "rigid_drive:terms=auto", ""}};
-
 std::string recordings_folder() {
   Manifest places;
   places.file = "public-benchmarks";
@@ -113,7 +65,7 @@ Dataset records_of(const Benchmark& benchmark, const Progress& progress) {
 }
 
 /// Our rows, then those of others.
-void add_rows(const Benchmark& benchmark, std::span<const Entry> entries, Study& study,
+void add_rows(const Benchmark& benchmark, std::span<const BenchmarkModel> entries, Study& study,
               const Progress& progress) {
   const Dataset dataset = records_of(benchmark, progress);
   const auto condition_of = [&](const std::string& recording) {
@@ -121,7 +73,7 @@ void add_rows(const Benchmark& benchmark, std::span<const Entry> entries, Study&
   };
   StudyRows rows;
   for (std::size_t i = 0; i < entries.size(); ++i) {
-    const Entry& entry = entries[i];
+    const BenchmarkModel& entry = entries[i];
     const std::string_view choice = study.options.is_quick ? entry.quick : entry.choice;
     if (choice.empty()) continue;
     if (choice != entry.name)

@@ -150,7 +150,14 @@ constexpr std::array kStudies{
               true},
     StudyInfo{"public-benchmarks", "official records",
               "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks, 5.0,
-              kPublishedBenchmarks, true}};
+              kPublishedBenchmarks, true},
+    StudyInfo{"board",
+              "public recordings",
+              "Published figures, every family and those who join, on public recordings",
+              board,
+              12.0,
+              {},
+              true}};
 
 }  // namespace
 

@@ -1,0 +1,149 @@
+#include <fmt/format.h>
+
+#include <string>
+#include <string_view>
+
+#include "studies/board_rows.hpp"
+#include "studies/board_run.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::string_view kIntroduction =
+    R"md(# Board of public recordings
+
+Written by `torsio reproduce board --recorded --page docs/board.md` from `studies/board_rows.csv` and the list of sets in
+`studies/board_sets.cpp`.
+
+Public recordings of actuators, each with a fixed split into training and test. A model is scored in free run: it is
+given the inputs of a test recording and no measured output but that of the first samples. Each table has published
+figures, the families of torsio, and the rows of all who joined, lowest error first.
+
+    torsio reproduce board                 # fits every family again: about ten minutes on two cores
+    torsio reproduce board --recorded      # the tables of this page, without a fit and without recordings
+
+The recordings are not part of torsio. They are read from the folder that `TORSIO_DATA` names, else from
+`../shared/data`; [recordings](#recordings) lists where each file is published, and the hash of its content. A set whose
+files are missing is left out with one line; a file with another content is refused.
+
+## Join
+
+1. Write the samples that are to be predicted, and those to train on:
+
+       torsio reproduce board --set emps --template test.csv --training train.csv
+
+   A line is a sample of a recording: `set`, `recording`, `sample` (from 0), `t_s`, whether it is scored (`scored_1`) or
+   trained on (`train_1`), the inputs, and the target where a model may use it. Any program can train on these
+   files; the original files may be used as well.
+2. Predict every sample with `scored_1` = 1 and write a CSV file with a header and one line for each of them:
+
+       set,recording,sample,prediction_m
+       emps,emps_val,20,0.000012
+       emps,emps_val,21,0.000013
+
+   The name of the last column ends in the unit of the set: `prediction_m`, `prediction_Nm` or `prediction_rad`. `t_s`
+   may take the place of `sample`. The order of lines and columns is free, further columns and lines that begin with `#`
+   are ignored, and so are predictions of samples that are not scored. A file is for one set and may be gzipped.
+3. Score it:
+
+       torsio reproduce board --predictions mine.csv --name "my model"
+
+   This prints the table of the set with the new row. It is computed by the code that scores the families of torsio. A
+   missing column, another unit, an unknown set or recording, a scored sample that is missing, occurs twice or
+   has no finite prediction are errors that name the line.
+4. To stay on this page, add the line that the call prints to `studies/board_rows.csv`, with the address of a
+   description or of the program in its last field, and open a pull request with the file of predictions attached.
+
+Rules: a prediction may use the inputs of its recording up to its sample, the target where the template states it, and
+the training part of the split. Settings are chosen within the training part. In `xl330_gain` all recordings are
+test recordings: the model of each is trained on those of the other three gains.
+
+## What the columns mean
+
+The error is in the unit of the set, over all scored samples together (RMSE) or as the mean over recordings (mean
+|error|). `+-` is the standard deviation of one run, for families whose fit depends on a seed. The origin is
+*published* (printed by others), *measured here* (a family of torsio, run by the command above) or *joined* (predictions
+of others, scored here). Measured and joined rows have the same condition: the split of the set, free run, the same scored
+samples. Of a published figure it is stated:
+
+- *same training and test*: the same two recordings, in free run. How many samples at the start were not scored
+  is not always printed.
+- *same test*: the same test recording in free run; the model was trained on other data of the same system.
+- *same test, as quoted by the source*: the figure was read in the comparison of another paper.
+- *another test*: the authors tested on a recording of their own. The figure is shown for orientation only.
+
+No torque error was published for `desr_*` and `cycloidal_*`, and no error at a gain that was left out for `xl330_gain`:
+BAM's models there were fitted here, by the search of `torsio identify`.
+)md";
+
+constexpr std::string_view kNotOnTheBoard = R"md(
+## Not on the board
+
+- `anydrive_lstm` (legged_gym, the LSTM of the ANYdrive series-elastic joint): weights and test vectors, no recording. The
+  tests compare torsio's import with them.
+- Servos STS3250 (Rhoban/bam, commit b53408c, `data_raw_feetech/*.json`, four recordings), MX-64 and MX-106 (BAM): their
+  files were not at hand, so that no hash can be stated.
+- Simulated joints: [model comparison](results/model_comparison.md).
+)md";
+
+std::string table_of(const BoardSet& set, std::span<const BoardRow> rows) {
+  std::string text = fmt::format(
+      "\n### {}: `{}`\n\nSplit: {}. Target `{}`, unit {}, score {}; {} scored samples. The first "
+      "{} "
+      "measured sample{} of a recording may be used and {} not scored.\n\n"
+      "| | model | {} [{}] | +- | runs | origin | condition and source |\n"
+      "|---|---|---|---|---|---|---|\n",
+      set.title, set.name, set.split, set.target, set.unit, name(set.measure), set.scored_samples,
+      set.initialise_samples, set.initialise_samples == 1 ? "" : "s",
+      set.initialise_samples == 1 ? "is" : "are",
+      set.measure == BoardMeasure::rmse ? "RMSE" : "mean error", set.unit);
+  std::size_t place = 0;
+  for (const BoardRow& row : rows_of(set, rows))
+    text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", ++place, row.model,
+                        row.text.empty() ? "-" : row.text,
+                        row.runs > 1 ? fmt::format("{:.2g}", row.spread) : std::string(),
+                        row.runs > 0 ? fmt::format("{}", row.runs) : std::string(),
+                        name(row.origin), row.remark);
+  return text;
+}
+
+std::string settings_text() {
+  std::string text =
+      "\n## Settings of the families\n\nFamilies without a line have their defaults. Those whose "
+      "defaults would take minutes on each set have cheaper settings: fewer starts, samples or "
+      "epochs. [Benchmarks](results/benchmarks.md) describes how those of `boucwen` and `emps` "
+      "were chosen on the training recording. `grey_box` and the other torque models are on the "
+      "sets with a torque; `rigid_drive` and `dynamic_bouc_wen` simulate a position from a force. "
+      "On the sets without official training data the fits are made once, on the others those that "
+      "depend on a seed three times.\n\n";
+  for (const std::string& setting : board_settings()) text += fmt::format("- `{}`\n", setting);
+  return text;
+}
+
+std::string recordings_text() {
+  std::string text =
+      "\n## Recordings\n\nThe hash is the SHA-256 of the unpacked content (`zcat FILE | "
+      "sha256sum`), so that it does not depend on the program that packed the file. Recordings "
+      "whose licence does not permit a copy are fetched by everyone from the address.\n\n"
+      "| folder | what | published at | licence | may be redistributed | files |\n"
+      "|---|---|---|---|---|---|\n";
+  for (const BoardSource& source : board_sources())
+    text += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", source.folder, source.title,
+                        source.address, source.licence,
+                        source.may_be_redistributed ? "yes" : "not known", source.columns);
+  text += "\n| file | SHA-256 of its content |\n|---|---|\n";
+  for (const BoardFile& file : board_files())
+    text += fmt::format("| `{}/{}` | `{}` |\n", file.folder, file.file, file.sha256);
+  return text;
+}
+
+}  // namespace
+
+std::string board_page(std::span<const BoardRow> rows) {
+  std::string page(kIntroduction);
+  page += "\n## The tables\n";
+  for (const BoardSet& set : board_sets()) page += table_of(set, rows);
+  return page + settings_text() + recordings_text() + std::string(kNotOnTheBoard);
+}
+
+}  // namespace torsio
