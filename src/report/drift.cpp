@@ -79,6 +79,10 @@ std::string advice_sentence(const Drift& drift) {
       return "The gain of the torque sensor has changed: check it before a new calibration, which "
              "would "
              "contain its error.";
+    case DriftAdvice::better_model:
+      return ratio +
+             "; what is undetermined needs a model with a smaller error, not longer "
+             "recordings.";
     case DriftAdvice::record_more: break;
   }
   return ratio + "; record more for a certain answer.";

@@ -29,18 +29,24 @@ struct DriftQuantity {
   double smallest = kNotMeasured;   ///< smallest |change| that the recordings must be able to show
   bool is_of_joint = true;          ///< false: of the load cell's mounting or of the lubricant
   DriftVerdict verdict = DriftVerdict::undetermined;
-  std::string reason = {};  ///< why it is undetermined
+  std::string reason = {};  ///< why it is undetermined, and what would determine it
+  double lasting = 0.0;     ///< half of the interval that remains however long the recordings are
+  /// How long the recordings would have to be, over their length, to determine it: infinite if no length does;
+  /// NaN if it is determined, or if that is not known.
+  double times_as_long = kNotMeasured;
 };
 
 /// `other_motion`: the error is larger than at the calibration, but none of the changes explains it.
 /// `check_sensor`: the gain of the torque sensor has changed, and a calibration would contain it.
+/// `better_model`: no longer recording determines what is undetermined.
 enum class DriftAdvice : std::uint8_t {
   none,
   set_zero,
   calibrate,
   other_motion,
   record_more,
-  check_sensor
+  check_sensor,
+  better_model
 };
 [[nodiscard]] std::string_view name(DriftAdvice advice) noexcept;
 
@@ -87,9 +93,9 @@ struct DriftOptions {
 /// with forces >= 0, and its other inputs u_k. s is the relative change of stiffness (or gain), f that of
 /// friction, z the zero, B = -E'(x) clip((x - x0) / w, -1, 1) the effect of more play, where E(x0) = 0. The
 /// standard errors are those of a circular block bootstrap; to them the error is added that the model itself
-/// may have in each direction. A quantity has changed if its 95 % interval lies outside of what a joint
-/// without a change shows, has not changed if the interval is inside of the smallest change that counts,
-/// and is undetermined otherwise.
+/// may have in each direction: a share of what neighbouring samples of the remaining residual have in common.
+/// A quantity has changed if its 95 % interval lies outside of what a joint without a change shows, has not
+/// changed if the interval is inside of the smallest change that counts, and is undetermined otherwise.
 /// @throws Error if the recordings have too few measured samples, a torque that is constant or does not
 /// follow, another unit, or a motion without deflection; as `predict`; UsageError for an option;
 /// Cancelled.

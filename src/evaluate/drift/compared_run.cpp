@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -43,6 +44,15 @@ void check_torque(const ComparedRun& of) {
 void require_length(const Recording& recording) {
   const double measured_s = static_cast<double>(recording.size()) / recording.sample_rate_Hz();
   if (measured_s < kLeastDuration_s) refuse_short(recording, seconds(measured_s));
+}
+
+std::size_t noise_lag(const ComparedRun& run) noexcept {
+  constexpr double kMemory_s = 0.005;
+  const std::vector<std::size_t>& rows = run.rows;
+  const auto samples = static_cast<double>(rows.back() - rows.front() + 1);
+  const double compared_Hz =
+      static_cast<double>(rows.size()) / samples * run.recording->sample_rate_Hz();
+  return static_cast<std::size_t>(std::max(1.0, std::round(kMemory_s * compared_Hz)));
 }
 
 ComparedRun compared_run(const ModelFile& model, const DatasetRecord& record,

@@ -24,6 +24,10 @@ struct ComparedRun {
 /// Fewest samples from which a change is estimated.
 inline constexpr std::size_t kLeastDriftSamples = 200;
 
+/// In how many compared samples 5 ms pass, at least 1: the noise of a load cell after a filter of 100 Hz or more
+/// has no memory of that length, a motion has.
+[[nodiscard]] std::size_t noise_lag(const ComparedRun& run) noexcept;
+
 /// @throws Error if the recording is shorter than 5 s.
 void require_length(const Recording& recording);
 

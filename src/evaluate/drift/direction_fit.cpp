@@ -82,6 +82,25 @@ double DirectionFit::residual_rms() const noexcept {
   return std::sqrt(sum / static_cast<double>(residual.size()));
 }
 
+LastingError DirectionFit::lasting_error(std::size_t lag) const noexcept {
+  constexpr std::size_t kSpan = 4;
+  const auto covariance = [this](std::size_t apart) {
+    double sum = 0.0;
+    for (std::size_t n = apart; n < residual.size(); ++n) sum += residual[n] * residual[n - apart];
+    return sum / static_cast<double>(residual.size());
+  };
+  const double power = covariance(0);
+  // A ripple may pass through zero at a single lag.
+  double shared = 0.0;
+  for (std::size_t apart = lag; apart <= kSpan * lag; ++apart)
+    shared = std::max(shared, covariance(apart));
+  // The correlation of white noise is 0 +- 1 / sqrt(N).
+  const double least = power / std::sqrt(static_cast<double>(residual.size()));
+  constexpr double kSure = 2.0;
+  return {.rms = std::sqrt(std::clamp(shared, least, std::max(least, power))),
+          .is_resolved = shared > kSure * least};
+}
+
 DirectionFit fit_directions(const Matrix& columns, std::span<const double> residual,
                             std::size_t resamples, std::uint64_t seed) {
   const Eigen::MatrixXd gram = gram_of(columns);

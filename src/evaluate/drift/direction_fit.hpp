@@ -10,6 +10,13 @@
 
 namespace torsio {
 
+/// The part of a residual that does not average out: the error of the model, which a motion of the same kind repeats.
+struct LastingError {
+  double rms = 0.0;
+  /// False: white noise hides it, and `rms` is what so many samples of the noise cannot exclude.
+  bool is_resolved = false;
+};
+
 /// Least squares of a residual on directions of change.
 struct DirectionFit {
   std::vector<double> coefficients;     ///< 0 where the direction was left out
@@ -20,6 +27,8 @@ struct DirectionFit {
   double effective_samples = kNotMeasured;
 
   [[nodiscard]] double residual_rms() const noexcept;
+  /// From the covariance of samples that are `lag` to 4 `lag` apart, in which noise of a sensor has no part.
+  [[nodiscard]] LastingError lasting_error(std::size_t lag) const noexcept;
 };
 
 /// A column of which the others explain all but `kLeastOwnShare` of its length is left out, the last first.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -95,7 +96,7 @@ class Comparison {
     drift.samples = residual_.size();
     drift.effective_samples = fit.effective_samples;
     drift.corrected_rmse = fit.residual_rms();
-    const double model_error = drift.corrected_rmse;
+    const LastingError model_error = fit.lasting_error(noise_lag(runs_.front()));
     drift.quantities = {zero(fit, model_error), scale(fit, model_error), friction(fit, model_error),
                         backlash(fit, model_error)};
     conclude(drift);
@@ -188,7 +189,7 @@ class Comparison {
   }
 
   [[nodiscard]] bool has_much_other_friction(const DirectionFit& fit) const {
-    const DriftQuantity of = friction(fit, fit.residual_rms());
+    const DriftQuantity of = friction(fit, fit.lasting_error(noise_lag(runs_.front())));
     return of.verdict == DriftVerdict::changed && std::abs(of.relative) > kSmallestFriction;
   }
 
@@ -213,7 +214,7 @@ class Comparison {
     return columns;
   }
 
-  [[nodiscard]] DriftQuantity zero(const DirectionFit& fit, double model_error) const {
+  [[nodiscard]] DriftQuantity zero(const DirectionFit& fit, const LastingError& model_error) const {
     double largest = 0.0;
     for (const double torque : parts_.elastic) largest = std::max(largest, std::abs(torque));
     DriftQuantity result = direction_quantity(
@@ -223,7 +224,8 @@ class Comparison {
     return result;
   }
 
-  [[nodiscard]] DriftQuantity scale(const DirectionFit& fit, double model_error) const {
+  [[nodiscard]] DriftQuantity scale(const DirectionFit& fit,
+                                    const LastingError& model_error) const {
     double mean = 0.0;
     for (const double slope : parts_.stiffness) mean += slope;
     mean /= static_cast<double>(parts_.stiffness.size());
@@ -231,24 +233,28 @@ class Comparison {
                               mean, fit, 1, model_error, kScaleTolerance, kSmallestScale);
   }
 
-  [[nodiscard]] DriftQuantity friction(const DirectionFit& fit, double model_error) const {
+  [[nodiscard]] DriftQuantity friction(const DirectionFit& fit,
+                                       const LastingError& model_error) const {
     double level = 0.0;
     for (const double torque : parts_.friction) level += std::abs(torque);
     level /= static_cast<double>(parts_.friction.size());
     DriftQuantity result =
         direction_quantity(drift_names::kFriction, unit_label(model_.settings.target), level, fit,
                            2, model_error, kFrictionTolerance, kSmallestFriction);
-    if (level < kLeastFriction * model_error) {
+    if (level < kLeastFriction * model_error.rms) {
       result.verdict = DriftVerdict::undetermined;
+      result.times_as_long = std::numeric_limits<double>::infinity();
       result.reason = "the model has no hysteresis loop above its error: fit one that has";
     } else if (reversals_ < kLeastReversals) {
       result.verdict = DriftVerdict::undetermined;
+      result.times_as_long = kNotMeasured;
       result.reason = fmt::format("the motion reverses {} times: move to and fro", reversals_);
     }
     return result;
   }
 
-  [[nodiscard]] DriftQuantity backlash(const DirectionFit& fit, double model_error) const {
+  [[nodiscard]] DriftQuantity backlash(const DirectionFit& fit,
+                                       const LastingError& model_error) const {
     DriftQuantity result = direction_quantity("backlash", "rad", kNotMeasured, fit, 3, model_error,
                                               kPlayTolerance * half(), kSmallestPlay * half());
     if (!std::isfinite(parts_.middle)) result.reason = "the torque does not pass through zero";
@@ -285,6 +291,7 @@ std::string_view name(DriftAdvice advice) noexcept {
     case DriftAdvice::calibrate: return "calibrate";
     case DriftAdvice::other_motion: return "other motion";
     case DriftAdvice::check_sensor: return "check the sensor";
+    case DriftAdvice::better_model: return "fit a better model";
     case DriftAdvice::record_more: break;
   }
   return "record more";

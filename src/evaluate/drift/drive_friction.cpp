@@ -118,16 +118,15 @@ std::optional<DriftQuantity> drive_friction(const ModelFile& reference, const Da
   const double before = known.coefficients[kDirection];
   const Matrix columns = columns_of(of, before);
   const DirectionFit fit = fit_directions(columns, of.residual, options.resamples, options.seed);
-  const double error = fit.residual_rms();
-  if (!(before > kLeastDriveFriction * error)) {
+  if (!(before > kLeastDriveFriction * fit.residual_rms())) {
     result.reason =
         "the reference has no friction of the drive above its error: give it an input with the "
         "direction of motion, as tanh(lowpass(rate(motor_angle_rad), 50Hz) / 0.6), and --set "
         "rates=true";
     return result;
   }
-  result = direction_quantity(drift_names::kDriveFriction, unit, before, fit, kDirection, error,
-                              kTolerance, kSmallest);
+  result = direction_quantity(drift_names::kDriveFriction, unit, before, fit, kDirection,
+                              fit.lasting_error(noise_lag(runs.front())), kTolerance, kSmallest);
   result.is_of_joint = false;
   return result;
 }

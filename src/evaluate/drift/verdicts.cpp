@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace torsio {
@@ -13,6 +14,7 @@ constexpr double kQuantile = 1.96;        // 95 %
 constexpr double kModelErrorShare = 0.3;  // share of the remaining residual
 constexpr double kExplained = 0.8;        // error with the changes corrected over that without
 constexpr double kWorthFactor = 1.5;      // error now over that of the calibration
+constexpr double kReserve = 1.5;  // factor on a length: the change that is found varies, too
 
 DriftQuantity& named(Drift& drift, const char* name) {
   return *std::ranges::find(drift.quantities, name, &DriftQuantity::name);
@@ -24,29 +26,70 @@ const DriftQuantity& named(const Drift& drift, const char* name) {
 
 bool is_decided(const DriftQuantity& of) { return of.verdict != DriftVerdict::undetermined; }
 
+/// How many times as long the recordings have to be for an interval that decides, if the change remains the same.
+double times_as_long(const DriftQuantity& of, const DriftHalfWidth& now) {
+  const double size = std::abs(of.change);
+  const double needed = std::max(size - of.tolerance, of.smallest - size);
+  const double noise = now.noise * now.noise;
+  const double model = now.model * now.model;
+  if (now.model_lasts)
+    return needed > now.model ? noise / (needed * needed - model)
+                              : std::numeric_limits<double>::infinity();
+  // noise / n + model / sqrt(n) = needed^2
+  const double root = std::hypot(model, 2.0 * now.noise * needed);
+  const double falls_to = 2.0 * needed * needed / (model + root);  // 1 / sqrt(n)
+  return 1.0 / (falls_to * falls_to);
+}
+
+/// What lasts of an interval, and what falls as the recordings grow.
+DriftHalfWidth parts_of(const DriftQuantity& of, double scale) {
+  const double all = 0.5 * (of.highest - of.lowest);
+  if (!std::isfinite(all)) return {.noise = kNotMeasured};
+  return {.noise = scale * std::sqrt(std::max(0.0, all * all - of.lasting * of.lasting)),
+          .model = scale * of.lasting};
+}
+
+std::string what_would_determine(const DriftQuantity& of, const DriftHalfWidth& now) {
+  if (std::isfinite(of.times_as_long))
+    return fmt::format("record {:.0f} times as long",
+                       std::max(2.0, std::ceil(kReserve * of.times_as_long)));
+  const double least = of.tolerance + now.model;
+  return fmt::format(
+      "the error of the model hides changes below {}, however long the recordings are: fit one "
+      "with "
+      "a smaller error",
+      std::isfinite(of.before) ? fmt::format("{:.2g} %", 100.0 * least / std::abs(of.before))
+                               : fmt::format("{:.2g} {}", least, of.unit));
+}
+
 }  // namespace
 
-void decide(DriftQuantity& of, double change, double half_width) {
+double DriftHalfWidth::all() const noexcept { return std::hypot(noise, model); }
+
+void decide(DriftQuantity& of, double change, const DriftHalfWidth& parts) {
+  const double half_width = parts.all();
   of.change = change;
   of.lowest = change - half_width;
   of.highest = change + half_width;
   of.relative = std::isfinite(of.before) ? change / of.before : kNotMeasured;
   of.verdict = DriftVerdict::undetermined;
   of.reason.clear();
+  of.lasting = parts.model_lasts ? parts.model : 0.0;
+  of.times_as_long = kNotMeasured;
   if (std::abs(change) - half_width > of.tolerance) {
     of.verdict = DriftVerdict::changed;
   } else if (std::abs(change) + half_width < of.smallest) {
     of.verdict = DriftVerdict::not_changed;
-  } else if (half_width > of.smallest - of.tolerance) {
-    of.reason = "these recordings show too little of it";
   } else {
-    of.reason = "near the limit: record longer";
+    of.times_as_long = times_as_long(of, parts);
+    of.reason = what_would_determine(of, parts);
   }
 }
 
 DriftQuantity direction_quantity(std::string of, std::string unit, double before,
-                                 const DirectionFit& fit, std::size_t column, double model_error,
-                                 double tolerance, double smallest) {
+                                 const DirectionFit& fit, std::size_t column,
+                                 const LastingError& model_error, double tolerance,
+                                 double smallest) {
   DriftQuantity result{.name = std::move(of), .unit = std::move(unit), .before = before};
   const double scale = std::isfinite(before) ? before : 1.0;
   result.tolerance = tolerance * scale;
@@ -55,8 +98,7 @@ DriftQuantity direction_quantity(std::string of, std::string unit, double before
     result.reason = "this motion does not separate it from the other changes";
     return result;
   }
-  const double error =
-      std::hypot(fit.standard_errors[column], kModelErrorShare * model_error / fit.own_rms[column]);
+  const double error = fit.standard_errors[column];
   const double change = fit.coefficients[column];
   result.change = change * scale;
   result.relative = std::isfinite(before) ? change : kNotMeasured;
@@ -67,13 +109,17 @@ DriftQuantity direction_quantity(std::string of, std::string unit, double before
         fit.effective_samples);
     return result;
   }
-  decide(result, change * scale, kQuantile * error * scale);
+  decide(result, change * scale,
+         {.noise = kQuantile * error * scale,
+          .model = kQuantile * kModelErrorShare * model_error.rms / fit.own_rms[column] * scale,
+          .model_lasts = model_error.is_resolved});
   return result;
 }
 
 void conclude(Drift& drift) {
   bool is_certain = true;
   bool has_changed = false;
+  bool longer_decides = false;
   bool has_new_zero = false;
   bool has_new_gain = false;
   for (const DriftQuantity& of : drift.quantities) {
@@ -84,6 +130,7 @@ void conclude(Drift& drift) {
       continue;
     }
     is_certain &= is_decided(of);
+    longer_decides |= !is_decided(of) && !std::isinf(of.times_as_long);
     has_changed |= of.verdict == DriftVerdict::changed;
   }
   drift.joint = has_changed  ? DriftVerdict::changed
@@ -100,7 +147,7 @@ void conclude(Drift& drift) {
   } else if (drift.rmse > worth || has_new_zero) {
     drift.advice = DriftAdvice::set_zero;
   } else if (!is_certain && !has_changed) {
-    drift.advice = DriftAdvice::record_more;
+    drift.advice = longer_decides ? DriftAdvice::record_more : DriftAdvice::better_model;
   }
 }
 
@@ -130,11 +177,13 @@ void separate_gain(Drift& drift, const Drift& reference) {
                           .tolerance = both.tolerance,
                           .smallest = both.smallest};
   if (std::isfinite(gain) && std::isfinite(gain_half_width)) {
-    decide(sensor, gain, gain_half_width);
-    const double half_width = 0.5 * (both.highest - both.lowest);
-    if (std::isfinite(half_width))
+    const DriftHalfWidth of_gain = parts_of(of_reference, 1.0 / of_reference.before);
+    const DriftHalfWidth of_both = parts_of(both, 1.0);
+    decide(sensor, gain, of_gain);
+    if (std::isfinite(of_both.all()))
       decide(stiffness, both.change - gain * both.before,
-             std::hypot(half_width, gain_half_width * both.before));
+             {.noise = std::hypot(of_both.noise, of_gain.noise * both.before),
+              .model = std::hypot(of_both.model, of_gain.model * both.before)});
   } else {
     sensor.reason = stiffness.reason = of_reference.reason;
   }

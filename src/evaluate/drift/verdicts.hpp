@@ -17,16 +17,27 @@ inline constexpr const char* kFriction = "friction";
 inline constexpr const char* kDriveFriction = "friction of the drive";
 }  // namespace drift_names
 
-/// Sets change, interval and verdict of a quantity whose 95 % interval is `change` +- `half_width`.
-void decide(DriftQuantity& of, double change, double half_width);
+/// Half of a 95 % interval: both parts are added in quadrature.
+struct DriftHalfWidth {
+  double noise = 0.0;  ///< falls with the square root of the length of the recordings
+  double model = 0.0;  ///< the share that the error of the model causes
+  /// False: the model's falls with the fourth root, as a `LastingError` that noise hides.
+  bool model_lasts = true;
+
+  [[nodiscard]] double all() const noexcept;
+};
+
+/// Sets change, interval and verdict of a quantity whose 95 % interval is `change` +- `half_width`; where it is
+/// undetermined, what would determine it.
+void decide(DriftQuantity& of, double change, const DriftHalfWidth& half_width);
 
 /// The quantity whose change is the coefficient of a column, with its verdict. The 95 % interval contains the
-/// standard error and the error `model_error` (RMS) that the model itself may have in this direction.
+/// standard error and the error that the model itself may have in this direction.
 /// @param before value of the model: coefficient, `tolerance` and `smallest` are relative to it; NaN: they are
 /// in `unit`
 [[nodiscard]] DriftQuantity direction_quantity(std::string of, std::string unit, double before,
                                                const DirectionFit& fit, std::size_t column,
-                                               double model_error, double tolerance,
+                                               const LastingError& model_error, double tolerance,
                                                double smallest);
 
 /// Verdict and advice from all quantities.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "torsio/core/random.hpp"
 
@@ -31,6 +32,31 @@ TEST(FitDirections, FindsTheCoefficientsAndTheirErrorsInCorrelatedNoise) {
   }
   // 95 % of them, less than 4 standard deviations of the count; white errors would cover about 35 %.
   EXPECT_GT(covered, 0.88 * kRuns);
+}
+
+/// An error of the model of the RMS 0.1 that turns slowly, and white noise.
+DirectionFit with_noise(double noise, std::size_t samples) {
+  Random random(5);
+  DirectionFit fit;
+  for (std::size_t n = 0; n < samples; ++n)
+    fit.residual.push_back(0.1 * std::numbers::sqrt2 * std::sin(0.02 * static_cast<double>(n)) +
+                           noise * random.normal());
+  return fit;
+}
+
+TEST(LastingError, IsThatOfTheModelAndNotTheNoise) {
+  for (const double noise : {0.0, 0.1, 0.3}) {
+    const LastingError found = with_noise(noise, 20'000).lasting_error(1);
+    EXPECT_NEAR(found.rms, 0.1, 0.01) << noise;
+    EXPECT_TRUE(found.is_resolved) << noise;
+  }
+}
+
+TEST(LastingError, IsWhatTheNoiseCannotExcludeWhereItIsHidden) {
+  const LastingError found = with_noise(3.0, 20'000).lasting_error(1);
+  EXPECT_FALSE(found.is_resolved);
+  EXPECT_GT(found.rms, 0.1);
+  EXPECT_LT(found.rms, 0.15 * 3.0);
 }
 
 TEST(FitDirections, LeavesOutWhatTheOthersExplain) {

@@ -8,11 +8,11 @@
 #include <limits>
 
 #include "actuator/stage_wear.hpp"
-#include "evaluate/drift/verdicts.hpp"
 #include "report/drift.hpp"
 #include "sim/campaign/drift_campaign.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
@@ -135,6 +135,36 @@ TEST(Drift, FindsAChangeOfTheFriction) {
   EXPECT_EQ(of(drift, "stiffness or gain").verdict, DriftVerdict::not_changed);
 }
 
+/// Sweeps of today with white noise of the load cell in addition.
+Dataset noisy_sweeps(const DataSheet& sheet, double noise_Nm, std::size_t count) {
+  Dataset dataset;
+  Random random(7);
+  for (std::size_t k = 0; k < count; ++k)
+    record(dataset, sheet, {.experiment = "sweep", .seed = 51 + k, .lever_m = 0.21}, Role::test);
+  return with_torque(dataset, [&](double torque) { return torque + noise_Nm * random.normal(); });
+}
+
+TEST(Drift, NoiseOfTheLoadCellAveragesOut) {
+  const Drift healthy = detect_drift(model(), noisy_sweeps(data_sheet(kActuator), 0.5, 1));
+  EXPECT_EQ(of(healthy, "friction").verdict, DriftVerdict::not_changed);
+  const Drift worn_out =
+      detect_drift(model(), noisy_sweeps(worn(data_sheet(kActuator), {.friction = 1.3}), 0.5, 1));
+  EXPECT_EQ(of(worn_out, "friction").verdict, DriftVerdict::changed);
+  EXPECT_NEAR(of(worn_out, "friction").relative, 0.3, 0.1);
+}
+
+TEST(Drift, RecordingAsLongAsAdvisedDeterminesTheFriction) {
+  const Drift once = detect_drift(model(), noisy_sweeps(data_sheet(kActuator), 1.5, 1));
+  const DriftQuantity& friction = of(once, "friction");
+  ASSERT_EQ(friction.verdict, DriftVerdict::undetermined);
+  EXPECT_EQ(once.advice, DriftAdvice::record_more);
+  ASSERT_THAT(friction.reason, testing::MatchesRegex("record [0-9]+ times as long"));
+  const std::size_t times = std::stoul(friction.reason.substr(std::string("record ").size()));
+  ASSERT_LE(times, 40U);
+  const Drift longer = detect_drift(model(), noisy_sweeps(data_sheet(kActuator), 1.5, times));
+  EXPECT_EQ(of(longer, "friction").verdict, DriftVerdict::not_changed) << times;
+}
+
 TEST(Drift, ADeflectionThatIsCountedTheOtherWayGivesTheSame) {
   const ModelFile mirrored =
       train_model(calibration(),
@@ -169,58 +199,6 @@ TEST(Drift, StatesTheRatioOfTheErrors) {
   file.settings.residuals = {};
   const Drift unknown = detect_drift(file, today(data_sheet(kActuator)));
   EXPECT_THAT(drift_text(unknown, "torque_Nm"), HasSubstr("cannot be determined"));
-}
-
-/// Quantities of a comparison, as far as `separate_gain` uses them.
-Drift compared(double scale, double half_width, double before) {
-  DriftQuantity both{.name = "stiffness or gain",
-                     .unit = "Nm/rad",
-                     .before = before,
-                     .tolerance = 0.012 * before,
-                     .smallest = 0.03 * before};
-  decide(both, scale * before, half_width * before);
-  Drift drift{.quantities = {both},
-              .calibration_rmse = 0.1,
-              .rmse = 0.1,
-              .zeroed_rmse = 0.1,
-              .corrected_rmse = 0.1};
-  conclude(drift);
-  return drift;
-}
-
-TEST(Drift, AReferenceSeparatesTheGainOfTheSensorFromTheStiffness) {
-  Drift gain = compared(0.08, 0.005, 600.0);
-  EXPECT_EQ(gain.joint, DriftVerdict::changed);
-  separate_gain(gain, compared(0.079, 0.006, 15000.0));
-  EXPECT_EQ(of(gain, "gain of the torque sensor").verdict, DriftVerdict::changed);
-  EXPECT_NEAR(of(gain, "gain of the torque sensor").relative, 0.079, 1e-12);
-  EXPECT_EQ(of(gain, "stiffness").verdict, DriftVerdict::not_changed);
-  EXPECT_NEAR(of(gain, "stiffness").relative, 0.001, 1e-9);
-  EXPECT_NEAR(of(gain, "stiffness").highest - of(gain, "stiffness").change,
-              600.0 * std::hypot(0.005, 0.006), 1e-9);
-  EXPECT_EQ(gain.joint, DriftVerdict::not_changed);
-  EXPECT_EQ(gain.advice, DriftAdvice::check_sensor);
-  EXPECT_THAT(drift_text(gain, "torque_Nm"), HasSubstr("check it before a new calibration"));
-
-  Drift stiffness = compared(-0.08, 0.005, 600.0);
-  separate_gain(stiffness, compared(0.001, 0.006, 15000.0));
-  EXPECT_EQ(of(stiffness, "gain of the torque sensor").verdict, DriftVerdict::not_changed);
-  EXPECT_EQ(of(stiffness, "stiffness").verdict, DriftVerdict::changed);
-  EXPECT_EQ(stiffness.joint, DriftVerdict::changed);
-}
-
-TEST(Drift, APoorReferenceLeavesTheSumToTheJoint) {
-  Drift drift = compared(0.08, 0.005, 600.0);
-  separate_gain(drift, compared(0.05, 0.13, 15000.0));
-  EXPECT_EQ(of(drift, "stiffness").verdict, DriftVerdict::undetermined);
-  EXPECT_EQ(of(drift, "gain of the torque sensor").verdict, DriftVerdict::undetermined);
-  EXPECT_EQ(drift.joint, DriftVerdict::changed);
-  Drift without = compared(0.08, 0.005, 600.0);
-  Drift unknown = compared(kNotMeasured, kNotMeasured, 15000.0);
-  unknown.quantities[0].reason = "too little";
-  separate_gain(without, unknown);
-  EXPECT_EQ(of(without, "stiffness").reason, "too little");
-  EXPECT_EQ(without.joint, DriftVerdict::changed);
 }
 
 TEST(Drift, AModelOfTheGearIsAReference) {
