@@ -48,6 +48,7 @@ Study identify_spring_study(const StudyOptions& options, const Progress& progres
 Study known_load_study(const StudyOptions& options, const Progress& progress);
 Study few_data_transfer(const StudyOptions& options, const Progress& progress);
 Study model_comparison(const StudyOptions& options, const Progress& progress);
+Study error_bars(const StudyOptions& options, const Progress& progress);
 Study public_benchmarks(const StudyOptions& options, const Progress& progress);
 Study board(const StudyOptions& options, const Progress& progress);
 

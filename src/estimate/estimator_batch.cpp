@@ -179,10 +179,11 @@ struct EstimatorBatch::Rows {
   ModelRows model_rows;
   std::vector<std::uint8_t> is_at_rest;
   std::vector<std::uint8_t> is_ordinary;
-  std::vector<double> previous_raw;    ///< rows x channels, of rows at rest
-  std::vector<double> previous_first;  ///< first feature, likewise
-  std::vector<double> last_value;      ///< meaningful for rows at rest only
-  std::vector<double> features;        ///< rows x inputs
+  std::vector<double> previous_raw;          ///< rows x channels, of rows at rest
+  std::vector<double> previous_first;        ///< first feature, likewise
+  std::vector<double> last_value;            ///< meaningful for rows at rest only
+  std::vector<detail::StrokeClock> strokes;  ///< likewise
+  std::vector<double> features;              ///< rows x inputs
 };
 
 EstimatorBatch::Rows::Rows(const EstimatorSettings& settings, const AnyModel& model,
@@ -200,6 +201,7 @@ EstimatorBatch::Rows::Rows(const EstimatorSettings& settings, const AnyModel& mo
       previous_raw(rows * channels),
       previous_first(rows),
       last_value(rows),
+      strokes(rows, worker.core.strokes()),
       features(rows * inputs) {
   worker.core.reset();
   worker.model.reset();
@@ -230,7 +232,7 @@ void EstimatorBatch::Rows::leave_rest(std::size_t row) noexcept {
   columns.write(row, state(row));
   read(worker.core, state(row).first(core_bytes));
   worker.core.continue_after(previous_raw.data() + row * channels, previous_first[row],
-                             last_value[row]);
+                             last_value[row], strokes[row]);
   write(worker.core, state(row).first(core_bytes));
   use_rows(model_rows, false, [&](auto& together) {
     together.write(row, state(row).subspan(core_bytes));
@@ -249,6 +251,7 @@ void EstimatorBatch::Rows::find_rest(std::size_t row) noexcept {
                     previous_raw.begin() + static_cast<std::ptrdiff_t>(row * channels));
   previous_first[row] = worker.core.previous_first();
   last_value[row] = worker.core.last_value();
+  strokes[row] = worker.core.strokes();
   is_at_rest[row] = 1;
   if (!has_resting) read(resting, state(row).first(core_bytes));
   has_resting = true;
@@ -269,6 +272,7 @@ void EstimatorBatch::Rows::find_ordinary(std::size_t first, std::size_t rows,
     }
   }
   columns.step(first, rows, raw);
+  const bool has_strokes = worker.core.has_strokes();
   for (std::size_t i = 0; i < inputs; ++i) {
     const double* const feature = columns.feature(i);
     const double lowest = worker.core.lowest(i);
@@ -285,6 +289,7 @@ void EstimatorBatch::Rows::find_ordinary(std::size_t first, std::size_t rows,
     if (ordinary[n] != 0) {
       std::copy_n(raw + n * channels, channels, previous_raw.data() + (first + n) * channels);
       previous_first[first + n] = features[(first + n) * inputs];
+      if (has_strokes) strokes[first + n].follow(previous_first[first + n]);
     } else {
       leave_rest(first + n);
       std::fill_n(features.data() + (first + n) * inputs, inputs, 0.0);
@@ -316,6 +321,7 @@ Estimate EstimatorBatch::Rows::ordinary_step(std::size_t row) noexcept {
   }
   if (estimate.fault != Fault::none || !std::isfinite(estimate.value))
     return unusable(row, estimate);
+  if (resting.has_strokes()) resting.set_strokes(strokes[row]);
   const Estimate guarded = resting.apply_guards({.features = now, .for_model = now}, estimate);
   last_value[row] = guarded.value;
   return guarded;

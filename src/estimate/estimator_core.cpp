@@ -115,6 +115,16 @@ void check_disturbances(const DisturbanceGuards& guards, std::size_t raw_inputs)
                     fmt::format("{}", guards.warm_up_s));
 }
 
+void check_strokes(const StrokeGuard& strokes) {
+  for (const auto& [name, value] : {std::pair{"longest_s", strokes.longest_s},
+                                    {"dead_band", strokes.dead_band},
+                                    {"growth", strokes.growth},
+                                    {"limit", strokes.limit}})
+    if (!std::isfinite(value) || value < 0.0)
+      refuse_settings(fmt::format("guards.strokes.{}", name), "a finite number, at least 0",
+                      fmt::format("{}", value));
+}
+
 void check_settings(const EstimatorSettings& settings, std::size_t model_input_count) {
   const std::vector<std::string>& inputs = settings.features.inputs;
   if (inputs.size() != model_input_count)
@@ -126,6 +136,7 @@ void check_settings(const EstimatorSettings& settings, std::size_t model_input_c
   check_ranges(settings.ranges, inputs);
   check_fallback(settings.fallback, inputs.size());
   check_residuals(settings.residuals);
+  check_strokes(settings.strokes);
 }
 
 void check_zeroed(const std::vector<std::string>& channels,
@@ -149,6 +160,7 @@ std::uint64_t identity_of(const EstimatorSettings& settings) noexcept {
   hash.add_value(settings.ranges);
   hash.add_value(settings.disturbances);
   hash.add_value(settings.output);
+  hash.add_value(settings.strokes);
   hash.add_value(settings.fallback);
   hash.add_value(settings.residuals);
   return hash.value();
@@ -187,6 +199,9 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
   std::ranges::transform(settings_.disturbances.largest_step, jump_limits_.begin(),
                          [](double step) { return kJumpFactor * step; });
   raw_slopes_ = slopes_at_rest();
+  if (settings_.strokes.growth > 0.0)
+    longest_stroke_ = settings_.strokes.longest_s * settings_.sample_rate_Hz;
+  strokes_ = StrokeClock(settings_.strokes.dead_band);
   limited_.resize(model_input_count);
   missed_parts_.resize(model_input_count);
   for (std::size_t i = 0; i < model_input_count; ++i)
@@ -249,6 +264,7 @@ void EstimatorCore::reset() noexcept {
   std::ranges::fill(previous_raw_, kNotMeasured);
   is_wrong_rate_ = false;
   memory_error_.reset();
+  strokes_.reset();
 }
 
 // One variable is returned everywhere: a copy of it would cost a third of the step of a linear model.
@@ -303,6 +319,7 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   }
   std::ranges::copy(raw, previous_raw_.begin());
   previous_first_ = features[0];
+  if (has_strokes()) strokes_.follow(features[0]);
   input.restarted = needs_reset_;
   needs_reset_ = false;
   has_run_ = true;
@@ -319,6 +336,7 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
   const Features features = input.features;
   const Excursion& excursion = input.excursion;
   const double std_dev = model_std_dev(raw_estimate);
+  const double novelty = has_strokes() ? stroke_novelty() : 0.0;
   Estimate out;
   out.fault = replaced_for(excursion, raw_estimate, std_dev);
   if (out.fault == Fault::none && !excursion.is_outside() &&
@@ -334,6 +352,9 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
     if (!memory_error_.is_zero()) out.std_dev = std::hypot(out.std_dev, memory_error_.bound());
     if (start_std_dev_ > 0.0) out.std_dev = std::hypot(out.std_dev, start_std_dev_);
     if (level_error_ > 0.0) out.std_dev = std::hypot(out.std_dev, level_error_);
+    if (novelty > 0.0)
+      out.std_dev = std::hypot(
+          out.std_dev, std::min(settings_.strokes.growth * novelty, settings_.strokes.limit));
     if (excursion.share > 0.0)
       out.std_dev = widened(out.std_dev, excursion, out.value - fallback_value(features));
     if (excursion.is_outside()) out.fault = Fault::outside_training_range;
@@ -343,7 +364,7 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
     if (!excursion.is_outside() && !is_wrong_rate_)
       out.std_dev = evidence(settings_.fallback.residual_std);
   }
-  out.novelty = raw_estimate.novelty;
+  out.novelty = has_strokes() && std::isnan(raw_estimate.novelty) ? novelty : raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
     // With an unknown zero, the range of a channel cannot be checked. A warm-up ends by itself, the want of a
     // zero does not: it is reported from the first tick on.
@@ -411,6 +432,11 @@ double EstimatorCore::start_std_dev_now() const noexcept {
   return sum / std::numbers::sqrt3;
 }
 
+double EstimatorCore::stroke_novelty() const noexcept {
+  const double share = strokes_.longest() / longest_stroke_;
+  return share > 1.0 ? (share - 1.0) * (share - 1.0) / share : 0.0;
+}
+
 double EstimatorCore::residual_std_at(double value) const noexcept {
   const ResidualTable& table = settings_.residuals;
   if (table.std_dev.empty()) return kNotMeasured;
@@ -430,7 +456,8 @@ GuardListing EstimatorCore::listing() const {
                        .depends_on_rate = depends_on_rate_,
                        .largest_output = largest_output_,
                        .jump_limits = jump_limits_,
-                       .raw_slopes = raw_slopes_};
+                       .raw_slopes = raw_slopes_,
+                       .longest_stroke = longest_stroke_};
   for (const Range& range : ranges_)
     listing.ranges.push_back(
         {range.lowest, range.highest, range.border, range.per_width, range.reach, range.held});

@@ -30,6 +30,7 @@ struct GuardListing {
   double largest_output = 0.0;           ///< infinite: no limit
   std::vector<double> jump_limits = {};  ///< per raw input; infinite: no limit
   std::vector<double> raw_slopes = {};
+  double longest_stroke = 0.0;  ///< ticks; 0: strokes are not followed
   ModelMemory memory = {};
   std::vector<double> decay = {};  ///< per relaxation
   double warm_up_ticks = 0.0;      ///< NaN: without end

@@ -103,6 +103,8 @@ ModelFile read_model(std::span<const std::byte> bytes, std::string_view place,
     take_leaves(contents, "guards.disturbances", place, model.settings.disturbances, may_be_nan);
   if (has_tensors_of(contents, "guards.output"))
     take_leaves(contents, "guards.output", place, model.settings.output, may_be_nan);
+  if (has_tensors_of(contents, "guards.strokes"))
+    take_leaves(contents, "guards.strokes", place, model.settings.strokes, may_be_nan);
   take_leaves(contents, "fallback", place, model.settings.fallback, may_be_nan);
   take_leaves(contents, "residuals", place, model.settings.residuals, may_be_nan);
   check_nothing_left(contents, place, model.parameters.family());
@@ -119,6 +121,8 @@ std::vector<std::byte> model_bytes(const ModelFile& model) {
   put_leaves(contents, "guards.ranges", model.settings.ranges);
   put_leaves(contents, "guards.disturbances", model.settings.disturbances);
   put_leaves(contents, "guards.output", model.settings.output);
+  if (model.settings.strokes.growth > 0.0)
+    put_leaves(contents, "guards.strokes", model.settings.strokes);
   put_leaves(contents, "fallback", model.settings.fallback);
   put_leaves(contents, "residuals", model.settings.residuals);
   return safetensors_bytes(contents);

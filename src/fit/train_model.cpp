@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "fit/common/guards.hpp"
@@ -118,6 +119,44 @@ void note_unexplained(const std::string& target, const HeldOutErrors& held_out,
                   target, held_out.rmse, held_out.constant_rmse));
 }
 
+/// Files of the training records, or recordings that are in memory only.
+std::size_t recordings_of(const Dataset& dataset) {
+  std::set<std::string> names;
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(Role::train))
+      names.insert(record.recording.source.file.empty() ? record.recording.name()
+                                                        : record.recording.source.file);
+  return names.size();
+}
+
+/// What is known of the error in other recordings. Recordings that were held out one after the other are better
+/// evidence than the ends of recordings, which contain another part of the motion; and few strokes have no end that
+/// resembles the rest.
+HeldOutErrors evidence_of(const FittedModel& fitted, const HeldOutErrors& held_out,
+                          const TrainingData& training, std::size_t recordings,
+                          std::size_t reversals) {
+  constexpr std::size_t kSeveral = 3;
+  const bool has_better = reversals < kFewReversals || fitted.held_out_records >= kSeveral;
+  HeldOutErrors evidence{.rmse = has_better && std::isfinite(fitted.held_out_rmse)
+                                     ? fitted.held_out_rmse
+                                     : std::fmax(fitted.held_out_rmse, held_out.rmse),
+                         .error_bar_factor = held_out.error_bar_factor,
+                         .own_std_dev = held_out.own_std_dev,
+                         .stroke_growth = fitted.stroke_growth,
+                         .factor = other_recordings_factor(recordings, reversals)};
+  if (reversals == 0) evidence.least_std_dev = target_std_dev(training);
+  return evidence;
+}
+
+std::string note_of_reversals(const TrainingData& training, std::size_t reversals) {
+  return fmt::format(
+      "warning: {} reverses fewer than {} times: how well the model repeats is not known, and the "
+      "error bars are {}",
+      training.inputs.front().expression, kFewReversals,
+      reversals == 0 ? "the standard deviation of " + training.target
+                     : "twice the error in the training, as in public recordings of few strokes");
+}
+
 TrainedModel train(const Dataset& dataset, const LearningData& data, const ModelChoice& choice,
                    FitContext context) {
   const FamilyInfo& family = find_family(choice.family);
@@ -153,21 +192,17 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
               };
               return family.fit(rest, options, again);
             });
+  const bool is_spring = fitted.model.traits().is_spring;
+  const std::size_t reversals = is_spring ? reversals_of(data.training) : kFewReversals;
   EstimatorSettings settings = guarded_settings(
       choice.features, data.training, fitted.model, data.validation ? &*data.validation : nullptr,
-      {.rmse = std::fmax(fitted.held_out_rmse, held_out.rmse),
-       .error_bar_factor = held_out.error_bar_factor,
-       .own_std_dev = held_out.own_std_dev});
+      evidence_of(fitted, held_out, data.training, recordings_of(dataset), reversals));
   const bool has_memory =
       !fitted.model.memory({settings.ranges.lowest, settings.ranges.highest}).is_empty();
   if (family.is_spring && has_memory && !held_out.has_return)
     refuse_motion_without_return(data.training);
   note_unexplained(data.training.target, held_out, notes);
-  if (fitted.model.traits().is_spring && least_std_dev(data.training) > 0.0)
-    notes.push_back(
-        fmt::format("warning: {} reverses fewer than {} times: how well the model repeats is not "
-                    "known, and the error bars are the standard deviation of {}",
-                    data.training.inputs.front().expression, kFewReversals, data.training.target));
+  if (reversals < kFewReversals) notes.push_back(note_of_reversals(data.training, reversals));
   TrainedModel trained{.file = {.card = std::move(card),
                                 .settings = std::move(settings),
                                 .parameters = fitted.model.parameters()},

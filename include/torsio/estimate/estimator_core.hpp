@@ -122,6 +122,50 @@ class MemoryError {
   bool is_zero_ = true;
 };
 
+/// For how many ticks an input has been moving in one direction, from one turning point to the next. All members
+/// are 0 after a reset.
+class StrokeClock {
+ public:
+  /// @param dead_band turning back by at most this is part of the stroke
+  explicit StrokeClock(double dead_band) : dead_band_(dead_band) {}
+
+  void reset() noexcept { *this = StrokeClock(dead_band_); }
+  void follow(double x) noexcept TORSIO_REALTIME {
+    if (ticks_ == 0.0) extreme_ = x;
+    ticks_ += 1.0;
+    since_extreme_ += 1.0;
+    const double moved = x - extreme_;
+    if (direction_ == 0.0) {
+      if (!(std::abs(moved) > dead_band_)) return;
+      direction_ = moved > 0.0 ? 1.0 : -1.0;
+    } else if (moved * direction_ < 0.0) {
+      if (!(std::abs(moved) > dead_band_)) return;
+      previous_ = ticks_ - since_extreme_;
+      ticks_ = since_extreme_;
+      direction_ = -direction_;
+    }
+    extreme_ = x;
+    since_extreme_ = 0.0;
+  }
+  /// How long the present stroke has lasted, from its turning point.
+  [[nodiscard]] double ticks() const noexcept { return ticks_; }
+  /// The longer one of the present stroke and the one before it.
+  [[nodiscard]] double longest() const noexcept { return std::max(ticks_, previous_); }
+
+  /// The members that change in a step.
+  void visit_state(StateBytes& bytes) noexcept {
+    bytes.visit(ticks_, previous_, since_extreme_, extreme_, direction_);
+  }
+
+ private:
+  double dead_band_;
+  double ticks_ = 0.0;
+  double previous_ = 0.0;       ///< ticks of the stroke before
+  double since_extreme_ = 0.0;  ///< ticks
+  double extreme_ = 0.0;        ///< the furthest value in the direction of this stroke
+  double direction_ = 0.0;      ///< 1, -1; 0: not known yet
+};
+
 /// After a gap in the inputs that is longer than this, filters and model are reset. In a shorter one, what
 /// depends on time receives interpolated inputs. As long a new level after a jump has to last until it is
 /// used.
@@ -250,7 +294,7 @@ class EstimatorCore {
   }
 
   /// Whether an ordinary tick (finite inputs without a jump, all features inside their ranges) would change
-  /// the filters, the last raw inputs and the last value only.
+  /// the filters, the last raw inputs, the last value and the clock of the strokes only.
   [[nodiscard]] bool is_at_rest() const noexcept TORSIO_REALTIME {
     return missed_ == 0 && !poisoned_ && !is_wrong_rate_ && !needs_reset_ && has_run_ &&
            !in_jump_ && excursion_ticks_ == 0.0 && level_error_ == 0.0 && is_settled() &&
@@ -260,11 +304,18 @@ class EstimatorCore {
   [[nodiscard]] std::span<const double> previous_raw() const noexcept { return previous_raw_; }
   [[nodiscard]] double previous_first() const noexcept { return previous_first_; }
   [[nodiscard]] double last_value() const noexcept { return last_value_; }
-  void continue_after(const double* raw, double first, double value) noexcept TORSIO_REALTIME {
+  [[nodiscard]] const StrokeClock& strokes() const noexcept { return strokes_; }
+  void continue_after(const double* raw, double first, double value,
+                      const StrokeClock& strokes) noexcept TORSIO_REALTIME {
     for (double& previous : previous_raw_) previous = *raw++;
     previous_first_ = first;
     last_value_ = value;
+    strokes_ = strokes;
   }
+  /// For the next `apply_guards`: one core serves many joints.
+  void set_strokes(const StrokeClock& strokes) noexcept TORSIO_REALTIME { strokes_ = strokes; }
+  /// Whether the error bar depends on the duration of strokes.
+  [[nodiscard]] bool has_strokes() const noexcept { return longest_stroke_ > 0.0; }
   /// The largest change of a raw input in a tick that is not a jump.
   [[nodiscard]] double jump_limit(std::size_t channel) const noexcept {
     return jump_limits_[channel];
@@ -285,7 +336,7 @@ class EstimatorCore {
     bytes.visit(pipeline_, missed_, poisoned_, last_value_, is_wrong_rate_, needs_reset_, has_run_,
                 in_jump_, has_returned_, zero_changed_, excursion_ticks_, excursion_share_,
                 previous_first_, previous_raw_, level_, start_std_dev_, memory_error_);
-    bytes.visit(level_ticks_, jump_, offsets_, level_error_);
+    bytes.visit(level_ticks_, jump_, offsets_, level_error_, strokes_);
   }
   /// Differs for the states of estimators with different settings.
   [[nodiscard]] std::uint64_t state_identity() const noexcept { return state_identity_; }
@@ -313,6 +364,8 @@ class EstimatorCore {
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double start_std_dev_now() const noexcept;
+  /// n of `StrokeGuard`; 0 in strokes that are no longer than those of the training.
+  [[nodiscard]] double stroke_novelty() const noexcept;
   /// The inputs of so many ticks could not be used.
   void interrupt(double ticks) noexcept;
   /// Whether a raw input differs from this one by more than it may change in so many ticks.
@@ -372,6 +425,8 @@ class EstimatorCore {
   std::vector<double> missed_parts_;  ///< by which the features were limited
   std::vector<double> widths_;        ///< widths of the ranges of the features
   double start_std_dev_ = 0.0;
+  StrokeClock strokes_{0.0};
+  double longest_stroke_ = 0.0;  ///< the longest in training [ticks]; 0: strokes are not followed
   std::uint64_t state_identity_ = 0;
   MemoryError memory_error_{{}, 0.0, 1.0, 0.0};
 };

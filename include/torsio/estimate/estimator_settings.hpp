@@ -99,6 +99,31 @@ struct OutputGuards {
   }
 };
 
+/// How the error of a model grows in strokes of the first input that last longer than those of the training: a
+/// slow motion shows what relaxes or creeps with time.
+///
+///     std_dev^2 += min(growth n, limit)^2,   n = (r - 1)^2 / r,   r = t / longest_s > 1
+///
+/// t is the duration of this stroke or of the one before it, whichever is longer. The model describes how the
+/// target depends on ln t within the training, so that what is left begins with the square of ln r, which n is
+/// near 1. n is the novelty.
+struct StrokeGuard {
+  double longest_s =
+      0.0;  ///< almost all training samples (99 %) are in strokes that are not longer
+  double dead_band =
+      0.0;  ///< turning back by less than this is part of the stroke [first input's unit]
+  double growth = 0.0;  ///< target's unit; 0: not known, and nothing is added
+  double limit = 0.0;   ///< standard deviation of the target in training
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("longest_s", self.longest_s);
+    visit("dead_band", self.dead_band);
+    visit("growth", self.growth);
+    visit("limit", self.limit);
+  }
+};
+
 /// Everything around the model: the path from raw channels to features, and the guards. Plain data,
 /// stored in the model file.
 struct EstimatorSettings {
@@ -110,6 +135,7 @@ struct EstimatorSettings {
   FeatureRanges ranges;
   DisturbanceGuards disturbances = {};
   OutputGuards output = {};
+  StrokeGuard strokes = {};
   LinearFallback fallback;
   ResidualTable residuals;
 };

@@ -133,6 +133,9 @@ GraphEstimate guarded(GraphBuilder& graph, const GraphGuards& guards, const Grap
     widened_std_dev =
         select(0.0 < tick.features.start_std_dev,
                hypotenuse(widened_std_dev, tick.features.start_std_dev), widened_std_dev);
+  if (!tick.stroke_std_dev.is_constant())
+    widened_std_dev = select(0.0 < tick.stroke_std_dev,
+                             hypotenuse(widened_std_dev, tick.stroke_std_dev), widened_std_dev);
   if (!e.share.is_constant())
     widened_std_dev = select(0.0 < e.share,
                              hypotenuse(widened_std_dev * (e.share * kExcursionGain + 1.0),

@@ -36,6 +36,7 @@ struct GraphTick {
   Row is_wrong_rate = {};   ///< a truth
   Row memory_is_open = {};  ///< a truth
   Row memory_bound = {};
+  Row stroke_std_dev = {};  ///< what a long stroke adds to the error bar; constant: nothing
   Row last_value = {};
 };
 [[nodiscard]] GraphEstimate guarded(GraphBuilder& graph, const GraphGuards& guards,

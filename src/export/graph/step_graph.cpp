@@ -68,6 +68,7 @@ class GuardedStep {
         excursion_error_ = graph_.state("excursion_share");
       }
     }
+    if (list.longest_stroke > 0.0) strokes_.emplace(graph_);
     const GraphBuilder::Scope own = graph_.end_scope();
     GraphFeatures features = pipeline_features(graph_, listing_, guards_.settings, raw,
                                                either(poisoned, 0.5 < missed), is_not(is_measured));
@@ -100,6 +101,8 @@ class GuardedStep {
       memory_is_open = memory->is_open();
       bound = memory->bound();
     }
+    const Row stroke_std_dev =
+        strokes_ ? follow_strokes(features.all.part(0), is_accepted) : graph_.constant(0.0);
     excursion.fallback = select(in_jump, kBoundless, excursion.fallback);
     const Row is_settled = both(features.is_settled, is_finite(features.start_std_dev));
     const GraphEstimate out = guarded(graph_, guards_,
@@ -109,6 +112,7 @@ class GuardedStep {
                                        .is_wrong_rate = is_wrong_rate,
                                        .memory_is_open = memory_is_open,
                                        .memory_bound = bound,
+                                       .stroke_std_dev = stroke_std_dev,
                                        .last_value = last_value},
                                       raw_estimate);
     const Row value = select(is_usable_tick, out.value, last_value);
@@ -171,12 +175,57 @@ class GuardedStep {
     memory.miss_others(is_outside, missed_parts);
   }
 
+  /// The members of `detail::StrokeClock`.
+  struct Strokes {
+    explicit Strokes(GraphBuilder& graph)
+        : ticks(graph.state("stroke_ticks")),
+          previous(graph.state("previous_stroke")),
+          since_extreme(graph.state("since_extreme")),
+          extreme(graph.state("extreme")),
+          direction(graph.state("stroke_direction")) {}
+    Row ticks, previous, since_extreme, extreme, direction;
+  };
+
+  /// One accepted tick of `detail::StrokeClock`. @returns what the stroke adds to the error bar
+  Row follow_strokes(Row x, Row is_accepted) {
+    const StrokeGuard& settings = guards_.settings.strokes;
+    const Row extreme = select(strokes_->ticks < 0.5, x, strokes_->extreme);
+    const Row ticks = minimum(strokes_->ticks + 1.0, kMaxMissed);
+    const Row since = minimum(strokes_->since_extreme + 1.0, kMaxMissed);
+    const Row moved = x - extreme;
+    const Row is_far = settings.dead_band < absolute(moved);
+    const Row is_unknown = absolute(strokes_->direction) < 0.5;
+    const Row turns = both(is_far, moved * strokes_->direction < 0.0);
+    const Row begins = both(is_unknown, is_far);
+    const Row advances =
+        either(begins, both(is_not(is_unknown), is_not(moved * strokes_->direction < 0.0)));
+    const Row is_extreme = either(turns, advances);
+    const Row direction =
+        select(either(begins, turns), select(0.0 < moved, 1.0, -1.0), strokes_->direction);
+    const Row new_ticks = select(turns, since, ticks);
+    const Row previous = select(turns, ticks - since, strokes_->previous);
+    const auto store = [&](const char* name, Row value, Row old) {
+      const Row stored = select(is_accepted, value, old);
+      graph_.set_state(name, stored);
+      return stored;
+    };
+    const Row present = store("stroke_ticks", new_ticks, strokes_->ticks);
+    const Row before = store("previous_stroke", previous, strokes_->previous);
+    store("since_extreme", select(is_extreme, 0.0, since), strokes_->since_extreme);
+    store("extreme", select(is_extreme, x, extreme), strokes_->extreme);
+    store("stroke_direction", direction, strokes_->direction);
+    const Row share = maximum(present, before) * (1.0 / guards_.listing.longest_stroke);
+    const Row beyond = maximum(share - 1.0, 0.0);
+    return minimum(beyond * beyond * settings.growth / maximum(share, 1.0), settings.limit);
+  }
+
   GraphBuilder& graph_;
   const AnyModel::Parameters& parameters_;
   const GraphGuards& guards_;
   const PipelineListing& listing_;
   Row excursion_ticks_ = {};
   Row excursion_error_ = {};  ///< the share of the range that may have been wrong in them
+  std::optional<Strokes> strokes_ = {};
 };
 
 StepGraph plain_step(GraphBuilder& graph, const ModelFile& model, const PipelineListing& listing) {

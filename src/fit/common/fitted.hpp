@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct Fitted {
   /// RMSE on training data that the fit held out for its choices; NaN for families that hold out
   /// none.
   double held_out_rmse = kNotMeasured;
+  /// Recordings that were held out for it one after the other; 0: parts of recordings were.
+  std::size_t held_out_records = 0;
+  double stroke_growth = 0.0;  ///< `StrokeGuard::growth`; 0: not known
 };
 
 }  // namespace torsio

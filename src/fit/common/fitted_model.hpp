@@ -15,8 +15,12 @@ namespace torsio {
 /// The result of a family's fitter in the form of the table of families.
 template <class Family>
 FittedModel fitted_model(Fitted<Family> fitted) {
-  return {Family(std::move(fitted.parameters)), std::move(fitted.notes), std::move(fitted.table),
-          fitted.held_out_rmse};
+  return {Family(std::move(fitted.parameters)),
+          std::move(fitted.notes),
+          std::move(fitted.table),
+          fitted.held_out_rmse,
+          fitted.held_out_records,
+          fitted.stroke_growth};
 }
 inline FittedModel fitted_model(FittedModel fitted) { return fitted; }
 

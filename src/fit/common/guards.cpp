@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fit/common/model_run.hpp"
+#include "fit/common/strokes.hpp"
 #include "fit/common/usable_table.hpp"
 #include "fit/common/warm_up.hpp"
 #include "numerics/least_squares.hpp"
@@ -225,15 +226,22 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   if (model.traits().is_spring) settings.disturbances.largest_step = training.largest_step;
   settings.disturbances.largest_travel = training.largest_travel;
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
-  if (validation == nullptr) widen_to(settings.residuals, held_out.rmse);
   settings.output.error_bar_factor = held_out.error_bar_factor;
-  if (model.traits().is_spring) {
-    const double least = least_std_dev(training);
-    for (double& std_dev : settings.residuals.std_dev) std_dev = std::max(std_dev, least);
-    if (held_out.own_std_dev > 0.0)
-      settings.output.error_bar_factor =
-          std::max(settings.output.error_bar_factor, least / held_out.own_std_dev);
+  if (validation == nullptr) {
+    widen_to(settings.residuals, held_out.rmse);
+    for (double& std_dev : settings.residuals.std_dev) std_dev *= held_out.factor;
+    settings.output.error_bar_factor *= held_out.factor;
   }
+  for (double& std_dev : settings.residuals.std_dev)
+    std_dev = std::max(std_dev, held_out.least_std_dev);
+  if (held_out.own_std_dev > 0.0)
+    settings.output.error_bar_factor =
+        std::max(settings.output.error_bar_factor, held_out.least_std_dev / held_out.own_std_dev);
+  if (held_out.stroke_growth > 0.0)
+    settings.strokes = {.longest_s = longest_stroke_s(training),
+                        .dead_band = stroke_dead_band(training),
+                        .growth = held_out.stroke_growth,
+                        .limit = target_std_dev(training)};
   add_target_errors(settings, validation != nullptr ? *validation : training, held_out.own_std_dev);
   settings.output.largest_target = 0.0;
   for_each_usable(training, [&](std::span<const double>, double target) {

@@ -37,7 +37,7 @@ void widen_to(ResidualTable& table, double rmse);
 /// The estimator settings around a fitted model in its file. The residual table is from
 /// `validation` where given (training residuals are too small for a model with many parameters).
 /// Otherwise it is from training, scaled up to what was held out where that is larger, as
-/// the model's own error bar is. A spring's error bar is at least `least_std_dev`. The errors of a target
+/// the model's own error bar is, and to what other recordings need (`HeldOutErrors::factor`). The errors of a target
 /// that was computed (`Sequence::target_error`) are added to each of them. `zeroed_channels` are set by the caller, who has the recordings.
 [[nodiscard]] EstimatorSettings guarded_settings(const FeatureSpec& features,
                                                  const TrainingData& training,

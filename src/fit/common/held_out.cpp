@@ -35,33 +35,6 @@ TrainingData without_last_third(TrainingData data) {
   return data;
 }
 
-/// Standard deviation of the target.
-double spread_of(const TrainingData& data) {
-  double sum = 0.0;
-  double square_sum = 0.0;
-  double count = 0.0;
-  for_each_usable(data, [&](std::span<const double>, double target) {
-    sum += target;
-    square_sum += target * target;
-    count += 1.0;
-  });
-  const double mean = sum / count;
-  return std::sqrt(std::max(0.0, square_sum / count - mean * mean));
-}
-
-/// How often the first input reverses, over the usable samples, counted up to `kFewReversals`.
-std::size_t reversals_of(const TrainingData& data) {
-  std::size_t reversals = 0;
-  for (const Sequence& sequence : data.sequences) {
-    std::vector<double> motion;
-    for (std::size_t n = 0; n < sequence.target.size(); ++n)
-      if (sequence.use[n] != 0) motion.push_back(sequence.features(n, 0));
-    reversals += count_reversals(motion, kFewReversals);
-    if (reversals >= kFewReversals) break;
-  }
-  return reversals;
-}
-
 /// The errors on what `rest` does not use. Samples outside its range are not counted: an estimator does not use
 /// the model there.
 HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const TrainingData& rest) {
@@ -98,7 +71,7 @@ HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const T
   const Metrics metrics = errors.metrics();
   if (metrics.samples < kLeastSamples) return found;
   found.rmse = metrics.rmse;
-  found.constant_rmse = spread_of(data);
+  found.constant_rmse = target_std_dev(data);
   if (const double ratio = ratios.metrics().rmse; ratio > 1.0 && std::isfinite(ratio))
     found.error_bar_factor = ratio;
   return found;
@@ -106,8 +79,34 @@ HeldOutErrors errors_of(const AnyModel& model, const TrainingData& data, const T
 
 }  // namespace
 
-double least_std_dev(const TrainingData& data) {
-  return reversals_of(data) < kFewReversals ? spread_of(data) : 0.0;
+double target_std_dev(const TrainingData& data) {
+  double sum = 0.0;
+  double square_sum = 0.0;
+  double count = 0.0;
+  for_each_usable(data, [&](std::span<const double>, double target) {
+    sum += target;
+    square_sum += target * target;
+    count += 1.0;
+  });
+  const double mean = sum / count;
+  return std::sqrt(std::max(0.0, square_sum / count - mean * mean));
+}
+
+std::size_t reversals_of(const TrainingData& data) {
+  std::size_t reversals = 0;
+  for (const Sequence& sequence : data.sequences) {
+    std::vector<double> motion;
+    for (std::size_t n = 0; n < sequence.target.size(); ++n)
+      if (sequence.use[n] != 0) motion.push_back(sequence.features(n, 0));
+    reversals += count_reversals(motion, kFewReversals);
+    if (reversals >= kFewReversals) break;
+  }
+  return reversals;
+}
+
+double other_recordings_factor(std::size_t recordings, std::size_t reversals) {
+  if (reversals < kFewReversals) return 2.0;
+  return recordings == 1 ? 1.5 : recordings == 2 ? 1.2 : 1.0;
 }
 
 HeldOutErrors held_out_errors(const TrainingData& data,

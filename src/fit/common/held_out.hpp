@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 
 #include "torsio/core/estimate.hpp"
@@ -16,12 +17,23 @@ struct HeldOutErrors {
   bool has_return = true;
   /// Root mean square of error over the model's own error bar, at least 1; 1 for a model without.
   double error_bar_factor = 1.0;
-  double own_std_dev = 0.0;  ///< root mean square of the model's own error bars; 0: it has none
+  double own_std_dev = 0.0;    ///< root mean square of the model's own error bars; 0: it has none
+  double stroke_growth = 0.0;  ///< `StrokeGuard::growth`
+  double factor = 1.0;         ///< `other_recordings_factor`, of every error bar
+  /// The least error bar: where the training has no reversal, the hysteresis is not known.
+  double least_std_dev = 0.0;
 };
 
-/// Standard deviation of the target, if the first input reverses fewer than `kFewReversals` times: how large the errors
-/// in other motions are is then not known. Else 0.
-[[nodiscard]] double least_std_dev(const TrainingData& data);
+/// How often the first input reverses, counted up to `kFewReversals`.
+[[nodiscard]] std::size_t reversals_of(const TrainingData& data);
+
+/// By what factor the error in other recordings is expected to be larger than what the training data show. Public
+/// recordings that were not used for it determine each value (docs/decisions/0042-coverage-in-other-motions.md).
+/// @param recordings files, or recordings made in memory
+[[nodiscard]] double other_recordings_factor(std::size_t recordings, std::size_t reversals);
+
+/// Standard deviation of the target over the usable samples.
+[[nodiscard]] double target_std_dev(const TrainingData& data);
 
 /// @param fit the family's fitter, with the options and the seed of the model
 /// @returns NaN where the rest does not suffice for a fit, or no sample is left. @throws Cancelled.

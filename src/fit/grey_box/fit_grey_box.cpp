@@ -20,6 +20,7 @@
 #include "fit/common/model_run.hpp"
 #include "fit/grey_box/grey_box_search.hpp"
 #include "fit/grey_box/late_target.hpp"
+#include "fit/grey_box/stroke_errors.hpp"
 #include "fit/mixture/fit_dgmm.hpp"
 #include "fit/network/fit_network.hpp"
 #include "numerics/parallel.hpp"
@@ -223,10 +224,21 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
       residual_of(*model, left.samples, options.bound * rms_of(left.samples, nullptr));
 }
 
+/// A box, the terms that it was fitted for, and its errors on what differs most from the rest of the data; 0: not
+/// determined.
+struct ChosenBox {
+  FittedGreyBox fitted;
+  GreyBoxChoice choice = {};
+  double spans_rmse = 0.0;  ///< a contiguous fifth of a single recording
+  StrokeErrors strokes = {};
+};
+
 /// Takes the terms of a search, with a note.
 /// @param without error without banks
-void keep(FittedGreyBox& fitted, const GreyBoxSearch& search,
-          const GreyBoxSearch::Candidate& chosen, const TrainingData& data, double without) {
+void keep(ChosenBox& box, const GreyBoxSearch& search, const GreyBoxSearch::Candidate& chosen,
+          const TrainingData& data, double without) {
+  FittedGreyBox& fitted = box.fitted;
+  box.choice = chosen.choice;
   fitted.parameters = search.fitted(chosen.choice);
   fitted.held_out_rmse = chosen.held_out_error;
   fitted.notes.push_back(
@@ -249,7 +261,7 @@ std::string note_of_lag(const TrainingData& data, const LateTarget& late,
 }
 
 /// Whether the banks over rates only compensate a late target; then without them, with a note.
-bool leave_to_latency(FittedGreyBox& fitted, const GreyBoxSearch& search, const GreyBoxChoice& main,
+bool leave_to_latency(ChosenBox& box, const GreyBoxSearch& search, const GreyBoxChoice& main,
                       const GreyBoxSearch::Candidate& chosen, const TrainingData& data,
                       const GreyBoxOptions& options, double rate_share, const Progress& progress) {
   if (!has_bank_over_rate(search.fitted(chosen.choice).terms, data)) return false;
@@ -257,14 +269,15 @@ bool leave_to_latency(FittedGreyBox& fitted, const GreyBoxSearch& search, const 
   if (!late) return false;
   const double without = search.held_out_error(main);
   if (!search.fitted(late->beside).terms.banks.empty())
-    keep(fitted, search, search.rated(late->beside), data, without);
-  fitted.notes.push_back(note_of_lag(data, *late, chosen, without));
+    keep(box, search, search.rated(late->beside), data, without);
+  box.fitted.notes.push_back(note_of_lag(data, *late, chosen, without));
   return true;
 }
 
 /// Adds the banks that predict better what is held out; none: the box stays as it is.
-void add_banks(FittedGreyBox& fitted, const GreyBoxChoice& main, const TrainingData& data,
+void add_banks(ChosenBox& box, const GreyBoxChoice& main, const TrainingData& data,
                const GreyBoxOptions& options, double rate_share, const Progress& progress) {
+  FittedGreyBox& fitted = box.fitted;
   const GreyBoxSearch search(data, options.schedule, fitted.parameters.terms);
   const GreyBoxSearch::Candidate chosen = search.choose_banks(main, progress);
   GreyBox::Parameters parameters = search.fitted(chosen.choice);
@@ -274,7 +287,7 @@ void add_banks(FittedGreyBox& fitted, const GreyBoxChoice& main, const TrainingD
                     search.what_was_held_out()));
     return;
   }
-  if (leave_to_latency(fitted, search, main, chosen, data, options, rate_share, progress)) return;
+  if (leave_to_latency(box, search, main, chosen, data, options, rate_share, progress)) return;
   // The terms of the first input were chosen to describe what the banks describe better.
   GreyBoxChoice line{.is_passive = options.passive, .banks = {}};
   for (const BankChoice& bank : chosen.choice.banks)
@@ -288,18 +301,12 @@ void add_banks(FittedGreyBox& fitted, const GreyBoxChoice& main, const TrainingD
     const GreyBoxSearch second(data, options.schedule, terms);
     const GreyBoxSearch::Candidate better = second.choose_banks(again.choice, progress);
     if (better.score < kClearly * chosen.score) {
-      keep(fitted, second, better, data, search.held_out_error(main));
+      keep(box, second, better, data, search.held_out_error(main));
       return;
     }
   }
-  keep(fitted, search, chosen, data, search.held_out_error(main));
+  keep(box, search, chosen, data, search.held_out_error(main));
 }
-
-/// A box, and the error where a contiguous fifth of a single recording is held out; 0: none was.
-struct ChosenBox {
-  FittedGreyBox fitted;
-  double spans_rmse = 0.0;
-};
 
 /// The box of the terms that predict best what is held out.
 ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, double rate_share,
@@ -309,13 +316,14 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
   ChosenBox box;
   FittedGreyBox& fitted = box.fitted;
   fitted.parameters = search.fitted(chosen.choice);
+  box.choice = chosen.choice;
   fitted.held_out_rmse = chosen.held_out_error;
   fitted.notes.push_back(fmt::format("{}; held out ({}): RMSE {:.4g}, linear model {:.4g}",
                                      search.description_of(chosen.choice, data),
                                      search.what_was_held_out(), chosen.held_out_error,
                                      search.held_out_error({})));
   if (!options.passive && options.banks && data.input_count() > 1)
-    add_banks(fitted, chosen.choice, data, options, rate_share, progress);
+    add_banks(box, chosen.choice, data, options, rate_share, progress);
   // With few strokes every fifth is another part of the motion.
   constexpr std::size_t kLeastStrokes = 20;
   if (search.has_one_record() && fitted.parameters.terms.banks.empty() &&
@@ -323,15 +331,25 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
     const GreyBoxSums spans = gather_spans(data, fitted.parameters.terms);
     box.spans_rmse = GreyBoxCandidate(spans, chosen.choice).held_out().rmse;
   }
+  fitted.held_out_records = search.held_out_records();
+  if (!fitted.parameters.coefficients.scheduled)
+    box.strokes = stroke_errors(data, fitted.parameters, box.choice, fitted.held_out_rmse);
   return box;
 }
 
 /// Error bars as wide as the error on the most different part of the data.
-void widen(FittedGreyBox& fitted, double spans_rmse) {
-  if (!(spans_rmse > fitted.held_out_rmse)) return;
-  fitted.held_out_rmse = spans_rmse;
-  fitted.notes.push_back(
-      fmt::format("error bars are those of held-out contiguous fifths: RMSE {:.4g}", spans_rmse));
+void widen(ChosenBox& box) {
+  const auto to = [&](double rmse, const char* of) {
+    if (!(rmse > box.fitted.held_out_rmse)) return;
+    box.fitted.held_out_rmse = rmse;
+    box.fitted.notes.push_back(
+        fmt::format("error bars are those of held-out {}: RMSE {:.4g}", of, rmse));
+  };
+  to(box.spans_rmse, "contiguous fifths");
+  // Whole recordings that were held out already contain strokes of all durations.
+  constexpr std::size_t kSeveral = 3;
+  if (box.fitted.held_out_records < kSeveral) to(box.strokes.rmse, "strokes of other durations");
+  box.fitted.stroke_growth = box.strokes.growth;
 }
 
 }  // namespace
@@ -356,7 +374,11 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
   FittedGreyBox& fitted = box.fitted;
   const double without = fitted.held_out_rmse;
   if (may_learn) learn_residual(fitted, data, options, context);
-  widen(fitted, box.spans_rmse * fitted.held_out_rmse / without);
+  // What a network adds is as good there as elsewhere.
+  const double gain = fitted.held_out_rmse / without;
+  box.spans_rmse *= gain;
+  box.strokes.rmse *= gain;
+  widen(box);
   return std::move(box.fitted);
 }
 

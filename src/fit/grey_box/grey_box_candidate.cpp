@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace torsio {
 namespace {
@@ -297,14 +298,17 @@ GreyBoxCandidate::HeldOut GreyBoxCandidate::left_out_folds(
   Sum all;
   double logarithms = 0.0;
   double scored = 0.0;
+  std::vector<double> of_folds;
   for (const Sum& fold : folds) {
+    of_folds.push_back(std::sqrt(fold.error / static_cast<double>(fold.rows)));
     all = {all.error + fold.error, all.rows + fold.rows};
     if (fold.rows == 0) continue;
     logarithms += 0.5 * std::log(fold.error / static_cast<double>(fold.rows));
     scored += 1.0;
   }
   return {.rmse = std::sqrt(all.error / static_cast<double>(all.rows)),
-          .geometric = std::exp(logarithms / scored)};
+          .geometric = std::exp(logarithms / scored),
+          .of_folds = std::move(of_folds)};
 }
 
 GreyBoxCandidate::HeldOut GreyBoxCandidate::held_out() const {

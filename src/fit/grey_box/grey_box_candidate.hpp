@@ -41,6 +41,7 @@ class GreyBoxCandidate {
   struct HeldOut {
     double rmse = 0.0;       ///< root mean square of all samples
     double geometric = 0.0;  ///< geometric mean of the folds' root mean squares; of levels: `rmse`
+    std::vector<double> of_folds = {};  ///< root mean squares; NaN for one without samples
   };
   [[nodiscard]] HeldOut held_out() const;
   /// Fitted to all data.

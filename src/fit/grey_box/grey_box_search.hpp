@@ -50,6 +50,11 @@ class GreyBoxSearch {
   [[nodiscard]] std::string description_of(const GreyBoxChoice& choice,
                                            const TrainingData& data) const;
   [[nodiscard]] const char* what_was_held_out() const;
+  /// Recordings that are held out one after the other, also those of the inner levels of a schedule; 0: parts of
+  /// recordings.
+  [[nodiscard]] std::size_t held_out_records() const noexcept {
+    return sums_.is_by_record || sums_.folds == 1 ? sums_.records : 0;
+  }
   /// Whether blocks of a single recording are held out.
   [[nodiscard]] bool has_one_record() const noexcept {
     return sums_.records == 1 && sums_.levels == 1;

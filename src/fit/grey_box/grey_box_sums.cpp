@@ -118,24 +118,34 @@ class RowSum {
   std::vector<std::pair<std::size_t, double>> row_;  ///< what is not 0
 };
 
-/// The fold of a sample in use. @param sample its place among the `usable` ones of its record
-std::size_t fold_of(const GreyBoxSums& sums, std::size_t record, std::size_t sample,
-                    std::size_t usable) {
+/// A sample in use.
+struct Place {
+  std::size_t sequence = 0;
+  std::size_t sample = 0;  ///< its place in the sequence
+  std::size_t record = 0;  ///< among those that are used
+  std::size_t used = 0;    ///< place among the `usable` samples of its record
+  std::size_t usable = 0;
+};
+
+std::size_t fold_of(const GreyBoxSums& sums, const Place& place) {
   if (sums.folds == 1) return 0;
-  if (sums.is_by_record) return record % sums.folds;
-  return sums.is_by_span ? sample * sums.folds / usable : interleaved_fold(sample, usable);
+  if (!sums.kinds.empty()) return sums.kinds[place.sequence][place.sample];
+  if (sums.is_by_record) return place.record % sums.folds;
+  return sums.is_by_span ? place.used * sums.folds / place.usable
+                         : interleaved_fold(place.used, place.usable);
 }
 
 /// Range of the first input in all samples but those of each fold.
 std::vector<SampleRange> ranges_of_others(const GreyBoxSums& sums, const TrainingData& data) {
   std::vector<SampleRange> ranges(sums.folds);
   std::size_t record = 0;
-  for (const Sequence& sequence : data.sequences) {
+  for (std::size_t s = 0; s < data.sequences.size(); ++s) {
+    const Sequence& sequence = data.sequences[s];
     const std::size_t usable = usable_samples(sequence);
     if (usable == 0) continue;
-    for (std::size_t n = 0, sample = 0; n < sequence.use.size(); ++n) {
+    for (std::size_t n = 0, used = 0; n < sequence.use.size(); ++n) {
       if (sequence.use[n] == 0) continue;
-      const std::size_t own = fold_of(sums, record, sample++, usable);
+      const std::size_t own = fold_of(sums, {s, n, record, used++, usable});
       for (std::size_t fold = 0; fold < sums.folds; ++fold)
         if (fold != own) ranges[fold].take(sequence.features(n, 0));
     }
@@ -151,7 +161,8 @@ void add_data(GreyBoxSums& sums, const TrainingData& data) {
   RowSum row;
   std::size_t record = 0;
   std::size_t used = 0;
-  for (const Sequence& sequence : data.sequences) {
+  for (std::size_t s = 0; s < data.sequences.size(); ++s) {
+    const Sequence& sequence = data.sequences[s];
     GreyBoxTerms terms(sums.all);
     std::size_t own = 0;
     const std::size_t usable = usable_samples(sequence);
@@ -161,7 +172,7 @@ void add_data(GreyBoxSums& sums, const TrainingData& data) {
       terms.move(features);
       if (sequence.use[n] == 0) continue;
       const bool is_in_gap = !sums.gap.empty() && is_next_to_border(own, usable);
-      const std::size_t fold = fold_of(sums, record, own, usable);
+      const std::size_t fold = fold_of(sums, {s, n, record, own, usable});
       ++own;
       if (used++ % stride != 0) continue;
       const std::size_t level = knot_at(sums.frame, features);
@@ -188,7 +199,8 @@ void add(NormalEquations& sum, const NormalEquations& part, double sign) {
 namespace {
 
 GreyBoxSums sums_of(const TrainingData& data, CoefficientSchedule frame,
-                    GreyBoxTerms::Structure all, bool with_gap, bool is_by_span = false) {
+                    GreyBoxTerms::Structure all, bool with_gap, bool is_by_span = false,
+                    const StrokeKinds* strokes = nullptr) {
   const std::size_t levels = std::max<std::size_t>(frame.knots.size(), 1);
   GreyBoxSums sums{.all = std::move(all),
                    .is_rate = {},
@@ -201,9 +213,13 @@ GreyBoxSums sums_of(const TrainingData& data, CoefficientSchedule frame,
   for (const auto& input : data.inputs) sums.is_rate.push_back(input.is_rate ? 1 : 0);
   choose_folds(sums, data);
   sums.is_by_span = is_by_span && sums.levels == 1 && !sums.is_by_record;
+  if (strokes != nullptr) {
+    sums.folds = strokes->count;
+    sums.kinds = strokes->kinds;
+  }
   const NormalEquations none(sums.all.columns());
   sums.cells.assign(sums.levels * sums.folds, none);
-  if (sums.is_by_record || sums.is_by_span) sums.beyond = sums.cells;
+  if (sums.is_by_record || sums.is_by_span || strokes != nullptr) sums.beyond = sums.cells;
   if (with_gap && !sums.is_by_record && sums.folds > 1) sums.gap.assign(sums.levels, none);
   add_data(sums, data);
   return sums;
@@ -243,6 +259,13 @@ std::size_t strokes_of(const TrainingData& data) {
 GreyBoxSums gather_spans(const TrainingData& data, const GreyBoxTerms::Structure& chosen) {
   GreyBoxSums sums = sums_of(data, {}, chosen, false, true);
   sums.is_main_chosen = true;
+  return sums;
+}
+
+GreyBoxSums gather_strokes(const TrainingData& data, const GreyBoxTerms::Structure& chosen,
+                           const StrokeKinds& strokes) {
+  GreyBoxSums sums = sums_of(data, {}, chosen, false, false, &strokes);
+  sums.is_main_chosen = sums.are_banks_chosen = true;
   return sums;
 }
 

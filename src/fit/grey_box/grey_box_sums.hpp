@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fit/common/regression.hpp"
+#include "fit/common/strokes.hpp"
 #include "fit/grey_box/bank_choice.hpp"
 #include "model/grey_box/grey_box.hpp"
 #include "numerics/nnls.hpp"
@@ -21,12 +22,14 @@ struct GreyBoxSums {
   static constexpr std::size_t kTimeConstants = 6;
 
   GreyBoxTerms::Structure all;
-  std::vector<std::uint8_t> is_rate;   ///< one per input
-  CoefficientSchedule frame;           ///< without values
-  std::size_t levels = 1;              ///< levels of the schedule
-  std::size_t folds = 1;               ///< 1: levels are held out instead
-  bool is_by_record = false;           ///< a fold is some records; else blocks or a span
-  bool is_by_span = false;             ///< a fold is a contiguous fifth of the only record
+  std::vector<std::uint8_t> is_rate;  ///< one per input
+  CoefficientSchedule frame;          ///< without values
+  std::size_t levels = 1;             ///< levels of the schedule
+  std::size_t folds = 1;              ///< 1: levels are held out instead
+  bool is_by_record = false;          ///< a fold is some records; else blocks or a span
+  bool is_by_span = false;            ///< a fold is a contiguous fifth of the only record
+  /// By sequence and sample, its fold: strokes of similar durations; empty: other folds.
+  std::vector<std::vector<std::uint8_t>> kinds = {};
   std::vector<NormalEquations> cells;  ///< [level * folds + fold]
   /// For each cell, the samples beyond the first input's range in all other cells; empty unless
   /// folds are records or spans. A guard replaces the model's value there, so these samples are not used to
@@ -61,6 +64,11 @@ struct GreyBoxSums {
 /// folds: what they have of another motion than the rest is not in neighbouring blocks.
 [[nodiscard]] GreyBoxSums gather_spans(const TrainingData& data,
                                        const GreyBoxTerms::Structure& chosen);
+
+/// Sums over terms that have been chosen, with banks or without, with groups of strokes as folds.
+[[nodiscard]] GreyBoxSums gather_strokes(const TrainingData& data,
+                                         const GreyBoxTerms::Structure& chosen,
+                                         const StrokeKinds& strokes);
 
 /// As `gather`, beside banks that have been chosen, with the gaps of `gather_banks`.
 [[nodiscard]] GreyBoxSums gather_beside(const TrainingData& data, const std::string& schedule,

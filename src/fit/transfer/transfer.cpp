@@ -66,6 +66,8 @@ void map_output(EstimatorSettings& settings, double gain, double offset) {
   settings.fallback.residual_std *= gain;
   for (double& edge : settings.residuals.edges) edge = gain * edge + offset;
   for (double& std_dev : settings.residuals.std_dev) std_dev *= gain;
+  settings.strokes.growth *= gain;
+  settings.strokes.limit *= gain;
 }
 
 bool is_positive(double value) { return value > 0.0 && std::isfinite(value); }

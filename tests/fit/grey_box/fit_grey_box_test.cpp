@@ -415,5 +415,36 @@ TEST(FitGreyBox, StatesWhyItCannotBeFitted) {
               HasSubstr("too few training samples"));
 }
 
+/// Sines of 4, 2, 1 and 0.5 Hz for 10 s each, at 250 Hz, on a spring whose stiffness has a part that relaxes.
+TrainingData relaxing_data(double relaxing_Nm_rad) {
+  Matrix features(10000, 1);
+  const double frequencies_Hz[] = {4.0, 2.0, 1.0, 0.5};
+  for (std::size_t n = 0; n < 10000; ++n)
+    features(n, 0) = 0.1 * std::sin(2.0 * std::numbers::pi * frequencies_Hz[n / 2500] * 0.004 *
+                                    static_cast<double>(n % 2500));
+  Random random(4);
+  // Creep without end: time constants far beyond those that a fast stroke shows.
+  std::vector<double> forces(3, 0.0);
+  double last = 0.0;
+  return test::training_data_of({{.expression = "spring_deflection_rad"}}, features, [&](Row x) {
+    double torque = 100.0 * x[0] + 0.02 * random.normal();
+    for (std::size_t i = 0; i < forces.size(); ++i) {
+      const double time_constant_s = 0.05 * std::pow(6.0, static_cast<double>(i));
+      forces[i] =
+          (forces[i] + relaxing_Nm_rad * (x[0] - last)) * std::exp(-0.004 / time_constant_s);
+      torque += forces[i] * (1.0 + 8.0 * x[0] * x[0] / 0.01);
+    }
+    last = x[0];
+    return torque;
+  });
+}
+
+TEST(FitGreyBox, ErrorBarsGrowWithTheDurationOfAStrokeOnlyWhereSlowStrokesShowIt) {
+  const double relaxing = fit_grey_box(relaxing_data(40.0), kBoxAlone, {}).stroke_growth;
+  const double elastic = fit_grey_box(relaxing_data(0.0), kBoxAlone, {}).stroke_growth;
+  EXPECT_GT(relaxing, 0.05);
+  EXPECT_LT(elastic, 0.01);
+}
+
 }  // namespace
 }  // namespace torsio

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,6 +33,9 @@ struct FittedModel {
   /// none. Where error bars cannot be estimated on validation records, they are not smaller than
   /// this.
   double held_out_rmse = kNotMeasured;
+  /// Recordings that were held out for it one after the other; 0: parts of recordings were.
+  std::size_t held_out_records = 0;
+  double stroke_growth = 0.0;  ///< `StrokeGuard::growth`; 0: not known
 };
 
 /// One setting that a structure search tries in addition to the defaults.
