@@ -157,7 +157,6 @@ TEST(Drift, RecordingAsLongAsAdvisedDeterminesTheFriction) {
   const Drift once = detect_drift(model(), noisy_sweeps(data_sheet(kActuator), 1.5, 1));
   const DriftQuantity& friction = of(once, "friction");
   ASSERT_EQ(friction.verdict, DriftVerdict::undetermined);
-  EXPECT_EQ(once.advice, DriftAdvice::record_more);
   ASSERT_THAT(friction.reason, testing::MatchesRegex("record [0-9]+ times as long"));
   const std::size_t times = std::stoul(friction.reason.substr(std::string("record ").size()));
   ASSERT_LE(times, 40U);
