@@ -69,17 +69,27 @@ struct BoardErrors {
   std::size_t diverged = 0;  ///< samples at which the model diverged, of all runs
 };
 
+/// Share of the scored samples without an estimate from which on a model has no row.
+constexpr double kLeastShareWithout = 0.1;
+
 BoardRow row_of(const BoardSet& set, std::string_view model, const BoardErrors& errors,
                 const std::string& failure) {
-  BoardRow row = measured_row(set.name, board_model_name(model), BoardOrigin::measured,
-                              failure.empty() ? errors.error.mean() : kNotMeasured);
+  const std::size_t scored = errors.samples + errors.without;
+  // An error of the other samples would be of another condition.
+  const bool is_incomplete =
+      kLeastShareWithout * static_cast<double>(scored) < static_cast<double>(errors.without);
+  BoardRow row =
+      measured_row(set.name, board_model_name(model), BoardOrigin::measured,
+                   failure.empty() && !is_incomplete ? errors.error.mean() : kNotMeasured);
   row.runs = std::max<std::size_t>(errors.error.count(), 1);
-  if (row.runs > 1) row.spread = errors.error.std_dev();
+  if (row.runs > 1 && !is_incomplete) row.spread = errors.error.std_dev();
   if (!failure.empty()) row.remark = "failed: " + as_field(failure);
   if (errors.diverged > 0)
     row.remark =
         fmt::format("diverged at {} samples: those of its guard are scored", errors.diverged);
-  if (errors.without > 0 && row.remark.empty())
+  if (is_incomplete)
+    row.remark = fmt::format("no estimate at {} of {} scored samples", errors.without, scored);
+  else if (errors.without > 0 && row.remark.empty())
     row.remark = fmt::format("{} samples are not scored: filters had not settled", errors.without);
   return row;
 }
@@ -202,6 +212,8 @@ void add_servo(const BoardSet& set, const StudyOptions& options, const Progress&
       values.push_back(trace.joint_angle_rad[sample]);
   }
   add("identify; terms chosen by all gains", board_score(set, targets, predictions).error);
+  rows.back().remark =
+      "another condition: its terms were also chosen by the gain that was left out";
   for (const BamComparison& bam : compare_with_bam(found, recordings, {.seed = options.seed}))
     add(fmt::format("BAM {} by the search of identify", bam.model), bam.held_out_mae_rad);
 }
@@ -259,9 +271,10 @@ Study board_study(const StudyOptions& options, const BoardRun& run) {
     const bool is_run = std::ranges::find(run.rows, set.name, &BoardRow::set) != run.rows.end();
     if (!is_run) continue;
     for (const BoardRow& row : rows_of(set, rows)) {
-      const std::string spread = row.runs > 1
-                                     ? fmt::format(", +- {:.2g} over {} runs", row.spread, row.runs)
-                                     : std::string();
+      const std::string own_spread = spread_text(row);
+      const std::string spread = own_spread.empty()
+                                     ? std::string()
+                                     : fmt::format(", +- {} over {} runs", own_spread, row.runs);
       table.rows.push_back({.condition = std::string(set.name),
                             .quantity = row.model,
                             .value = row.error,

@@ -28,6 +28,7 @@ ComparisonCase official(const BoardSet& set, const std::string& train,
                         const LoadOptions& more) {
   const std::string at = board_folder() + "/" + std::string(set.folder) + "/";
   std::vector<std::string> files;
+  files.reserve(tests.size());
   for (const std::string& test : tests) files.push_back(at + test + ".csv.gz");
   LoadOptions load = more;
   load.target = set.target;
@@ -92,19 +93,24 @@ std::string cell(double value) {
 bool may_use_target(const BoardSet& set, const DatasetRecord& record, std::size_t sample,
                     std::size_t start, BoardPart part) {
   if (is_in(record, sample, Role::train)) return true;
-  // Of a set without training recordings, each test recording trains the models of others.
+  // Where a set has test recordings only, each of them trains the models of the others.
   if (part == BoardPart::training && set.data == "xl330") return true;
   return part == BoardPart::test && sample < start;
 }
 
-/// Channels that a model may use: not the target, nor what it was computed from.
-std::vector<const Channel*> usable_channels(const Dataset& dataset, const Recording& recording) {
+/// Channels that a model may use: not the target, nor what it was computed from or what follows from it.
+std::vector<const Channel*> usable_channels(const BoardSet& set, const Dataset& dataset,
+                                            const Recording& recording, BoardPart part) {
+  const auto is_in_list = [](const auto& list, std::string_view name) {
+    return std::ranges::find(list, name) != list.end();
+  };
   std::vector<const Channel*> channels;
-  for (const Channel& channel : recording.channels())
-    if (channel.name != dataset.target &&
-        std::ranges::find(dataset.target_computed_from, channel.name) ==
-            dataset.target_computed_from.end())
-      channels.push_back(&channel);
+  for (const Channel& channel : recording.channels()) {
+    if (channel.name == dataset.target || is_in_list(dataset.target_computed_from, channel.name))
+      continue;
+    if (part == BoardPart::test && is_in_list(set.hidden, channel.name)) continue;
+    channels.push_back(&channel);
+  }
   return channels;
 }
 
@@ -184,7 +190,7 @@ std::string board_samples(const BoardSet& set, const Dataset& dataset, BoardPart
     const bool is_trained = record.has_role(Role::train) || set.data == "xl330";
     if (is_test ? !is_tested(set, record) : !is_trained) continue;
     const Recording& recording = record.recording;
-    const std::vector<const Channel*> channels = usable_channels(dataset, recording);
+    const std::vector<const Channel*> channels = usable_channels(set, dataset, recording, part);
     const Channel& target = recording.channel(dataset.target);
     const std::size_t start = start_of(set, target);
     if (csv.empty()) {

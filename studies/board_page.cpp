@@ -26,6 +26,10 @@ The recordings are not part of torsio. They are read from the folder that `TORSI
 `../shared/data`; [recordings](#recordings) lists where each file is published, and the hash of its content. A set whose
 files are missing is left out with one line; a file with another content is refused.
 
+    torsio reproduce board --rows studies/board_rows.csv
+
+writes the rows of a run, from which the program is built again; sets that were left out keep their rows.
+
 ## Join
 
 1. Write the samples that are to be predicted, and those to train on:
@@ -56,19 +60,23 @@ files are missing is left out with one line; a file with another content is refu
 
 Rules: a prediction may use the inputs of its recording up to its sample, the target where the template states it, and
 the training part of the split. Settings are chosen within the training part. In `xl330_gain` all recordings are
-test recordings: the model of each is trained on those of the other three gains.
+test recordings: the model of each is trained on those of the other three gains. Its measured speed and duty follow from
+the angle, so that they are not inputs and not in the template.
 
 ## What the columns mean
 
 The error is in the unit of the set, over all scored samples together (RMSE) or as the mean over recordings (mean
 |error|). `+-` is the standard deviation of one run, for families whose fit depends on a seed. The origin is
 *published* (printed by others), *measured here* (a family of torsio, run by the command above) or *joined* (predictions
-of others, scored here). Measured and joined rows have the same condition: the split of the set, free run, the same scored
-samples. Of a published figure it is stated:
+of others, scored here). Measured and joined rows have the same condition, unless the row states another: the split of the
+set, free run, the same scored samples. A remark states where a family has no estimate because its filters or its window
+had not settled; one that has none at more than a tenth of the samples has no error. In
+[benchmarks](results/benchmarks.md) 50 samples start a model of `emps`, here 20, as the benchmark prescribes. Of a
+published figure it is stated:
 
 - *same training and test*: the same two recordings, in free run. How many samples at the start were not scored
   is not always printed.
-- *same test*: the same test recording in free run; the model was trained on other data of the same system.
+- *same test*: the same test recording in free run; the model may have been trained on other data of the same system.
 - *same test, as quoted by the source*: the figure was read in the comparison of another paper.
 - *another test*: the authors tested on a recording of their own. The figure is shown for orientation only.
 
@@ -100,8 +108,7 @@ std::string table_of(const BoardSet& set, std::span<const BoardRow> rows) {
   std::size_t place = 0;
   for (const BoardRow& row : rows_of(set, rows))
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", ++place, row.model,
-                        row.text.empty() ? "-" : row.text,
-                        row.runs > 1 ? fmt::format("{:.2g}", row.spread) : std::string(),
+                        row.text.empty() ? "-" : row.text, spread_text(row),
                         row.runs > 0 ? fmt::format("{}", row.runs) : std::string(),
                         name(row.origin), row.remark);
   return text;
@@ -114,8 +121,7 @@ std::string settings_text() {
       "epochs. [Benchmarks](results/benchmarks.md) describes how those of `boucwen` and `emps` "
       "were chosen on the training recording. `grey_box` and the other torque models are on the "
       "sets with a torque; `rigid_drive` and `dynamic_bouc_wen` simulate a position from a force. "
-      "On the sets without official training data the fits are made once, on the others those that "
-      "depend on a seed three times.\n\n";
+      "The column of runs states of how many fits with different seeds a row is the mean.\n\n";
   for (const std::string& setting : board_settings()) text += fmt::format("- `{}`\n", setting);
   return text;
 }

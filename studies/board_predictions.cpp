@@ -174,7 +174,7 @@ class PredictionReader {
 /// The sample of a recording at a time.
 std::size_t sample_at(const PredictionFile& file, const PredictedSample& predicted,
                       const Recording& recording) {
-  constexpr double kTolerance = 0.1;  // of a period: digits of a time that was written as text
+  constexpr double kTolerance = 0.1;  // periods, for the digits of a time that was written as text
   const double exact = (predicted.t_s - recording.time_s(0)) * recording.sample_rate_Hz();
   const double nearest = std::round(exact);
   if (std::isfinite(exact) && nearest >= 0.0 && std::abs(exact - nearest) <= kTolerance)
@@ -238,7 +238,7 @@ std::vector<std::vector<double>> matched_predictions(const PredictionFile& file,
                                                      const Dataset& dataset,
                                                      std::span<const BoardTarget> targets) {
   std::vector<std::vector<double>> values;
-  std::vector<std::vector<std::size_t>> lines;  // of each scored sample; 0: none yet
+  std::vector<std::vector<std::size_t>> lines;  // by scored sample; 0: none yet
   values.reserve(targets.size());
   lines.reserve(targets.size());
   for (const BoardTarget& target : targets) {

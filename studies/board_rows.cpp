@@ -131,6 +131,10 @@ std::vector<BoardRow> rows_of(const BoardSet& set, std::span<const BoardRow> row
   return own;
 }
 
+std::string spread_text(const BoardRow& row) {
+  return std::isfinite(row.spread) ? fmt::format("{:.2g}", row.spread) : std::string();
+}
+
 std::string board_table(const BoardSet& set, std::span<const BoardRow> rows) {
   TextTable table;
   table.header({"", "model", fmt::format("{} {}", name(set.measure), set.unit), "+-", "runs",
@@ -138,8 +142,7 @@ std::string board_table(const BoardSet& set, std::span<const BoardRow> rows) {
   std::size_t place = 0;
   for (const BoardRow& row : rows_of(set, rows))
     table.row({fmt::format("{}", ++place), row.model, row.text.empty() ? "-" : row.text,
-               row.runs > 1 ? fmt::format("{:.2g}", row.spread) : std::string(),
-               row.runs > 0 ? fmt::format("{}", row.runs) : std::string(),
+               spread_text(row), row.runs > 0 ? fmt::format("{}", row.runs) : std::string(),
                std::string(name(row.origin)), row.remark});
   return fmt::format("{}: {}\n{}\n{}", set.name, set.title, set.split, table.text());
 }

@@ -48,12 +48,15 @@ struct BoardRow {
 /// One line of it, without the end of the line.
 [[nodiscard]] std::string board_row_csv(const BoardRow& row);
 
-/// @throws UsageError unless the name is of 1 to 60 letters, digits, spaces and signs other than the comma, the quote, the
-/// bar and the backslash.
+/// @throws UsageError unless the name has 1 to 60 characters, none of which is a comma, a quote, a vertical line or a
+/// backslash.
 void require_board_name(const std::string& name, const std::string& place);
 
 /// The rows of a set, lowest error first, failed ones last.
 [[nodiscard]] std::vector<BoardRow> rows_of(const BoardSet& set, std::span<const BoardRow> rows);
+
+/// The standard deviation of one run as a cell of a table; empty for fewer than two.
+[[nodiscard]] std::string spread_text(const BoardRow& row);
 
 /// The table of a set for a terminal.
 [[nodiscard]] std::string board_table(const BoardSet& set, std::span<const BoardRow> rows);

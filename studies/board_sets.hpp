@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -17,7 +18,7 @@ struct BoardSource {
   std::string_view address;  ///< where they are published
   std::string_view licence;
   bool may_be_redistributed = false;
-  std::string_view columns;  ///< of the files here, and what was changed from the published ones
+  std::string_view columns;  ///< columns of the files, and what was changed from the published ones
 };
 
 /// A file of a source with the SHA-256 of its content, unpacked: how it is packed does not matter.
@@ -46,7 +47,8 @@ struct BoardSet {
   bool is_split_official = false;
   std::string_view target;
   std::string_view unit;
-  std::string_view training;  ///< what a participant may train on
+  /// Channels of the test recordings that a model must not use, since they follow from the target.
+  std::array<std::string_view, 2> hidden = {};
   std::size_t initialise_samples =
       0;  ///< measured samples at the start of a recording that a model may use; they are not scored
   std::size_t scored_samples = 0;

@@ -15,6 +15,7 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "reproduce_board.hpp"
 #include "studies/paper_items.hpp"
 #include "studies/studies.hpp"
 #include "studies/study_cache.hpp"
@@ -36,6 +37,7 @@ struct ReproduceFlags {
   std::string page;
   JsonOutput json;
   ReportOutput report;
+  BoardFlags board;
 };
 
 constexpr std::string_view kPaperTitles =
@@ -201,8 +203,12 @@ void write_plot(const std::string& path, const torsio::StudyOutcome& outcome) {
 
 void run(const ReproduceFlags& flags) {
   if (flags.list) return list(flags);
+  if (flags.board.is_used() ||
+      (!flags.page.empty() && flags.items == std::vector<std::string>{"board"}))
+    return reproduce_board(flags.board, flags.items, flags.options, flags.page, flags.json);
   if (!flags.page.empty())
-    throw torsio::UsageError({.place = "torsio reproduce --page", .problem = "it needs --list"});
+    throw torsio::UsageError({.place = "torsio reproduce --page",
+                              .problem = "it needs --list, or the item board alone"});
   std::vector<std::string> failed;
   const std::vector<const torsio::StudyInfo*> wanted = wanted_studies(flags, failed);
   check_plot(flags, wanted);
@@ -265,13 +271,15 @@ void add_reproduce(CLI::App& app) {
       "Without an item all experiments that need no recordings or solver are run: about two hours "
       "on two cores. Outcomes are kept in XDG_CACHE_HOME or ~/.cache, so that an interrupted call "
       "continues where it was; another build of the program does not use them. "
-      "public-benchmarks and model-comparison read recordings in TORSIO_DATA or "
+      "board, public-benchmarks and model-comparison read recordings in TORSIO_DATA or "
       "../shared/data; 003-coupling runs CalculiX (apt-get install calculix-ccx); 004-sensitivity "
       "takes a quarter of an hour.");
   verb->add_option("ITEM", flags->items, "name of an experiment; --list shows them");
   verb->add_flag("--list", flags->list,
                  "show the experiments and every item of the papers with its status");
-  verb->add_option("--page", flags->page, "with --list: write the items as a page: docs/papers.md");
+  verb->add_option("--page", flags->page,
+                   "with --list: write the items as a page: docs/papers.md; with the item board: "
+                   "docs/board.md");
   verb->add_flag("--fresh", flags->is_fresh, "run also what this program has run before");
   verb->add_flag(
       "--quick", flags->options.is_quick,
@@ -284,5 +292,6 @@ void add_reproduce(CLI::App& app) {
   verb->add_option("--plot", flags->plot,
                    "draw the figure of an experiment that has one: SVG, PNG or PDF");
   flags->report.add_page(*verb);
+  flags->board.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

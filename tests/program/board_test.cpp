@@ -1,0 +1,71 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "program.hpp"
+
+namespace torsio {
+namespace {
+
+using test::kCallWasWrong;
+using test::kWorkFailed;
+using test::Outcome;
+using testing::AllOf;
+using testing::HasSubstr;
+
+class BoardCalls : public test::Program {};
+
+TEST_F(BoardCalls, ShowTheRecordedTablesWithoutRecordings) {
+  const Outcome outcome =
+      shell("TORSIO_DATA=/nowhere {torsio} reproduce board --recorded --json x.json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("emps: EMPS"), HasSubstr("dynoNet"),
+                                 HasSubstr("measured here"), HasSubstr("published")));
+  EXPECT_THAT(contents("x.json"), AllOf(HasSubstr("\"set\": \"xl330_gain\""),
+                                        HasSubstr("\"measure\": \"mean |error|\"")));
+}
+
+TEST_F(BoardCalls, StateWhereMissingRecordingsBelong) {
+  std::ofstream(folder_.path("mine.csv"))
+      << "set,recording,sample,prediction_m\nemps,emps_val,20,0\n";
+  std::filesystem::create_directory(folder_.path("data"));
+  const Outcome outcome =
+      shell("TORSIO_DATA=$PWD/data {torsio} reproduce board --predictions mine.csv --name mine");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("emps/emps_est.csv.gz is missing"),
+                                 HasSubstr("helonayala/narmax"), HasSubstr("data/emps")));
+}
+
+TEST_F(BoardCalls, WithOptionsThatDoNotBelongTogetherAreRefused) {
+  const auto refused = [&](const std::string& call, const std::string& text) {
+    const Outcome outcome = torsio("reproduce " + call);
+    EXPECT_EQ(outcome.exit_code, kCallWasWrong) << call;
+    EXPECT_THAT(outcome.err, HasSubstr(text)) << call;
+  };
+  refused("001-models --recorded", "are for the item board alone");
+  refused("--predictions a.csv --name mine", "are for the item board alone");
+  refused("board --predictions a.csv", "it needs --name");
+  refused("board --name mine", "it needs --name");
+  refused("board --template a.csv", "they need it");
+  refused("board --set emps", "it belongs to --template");
+  refused("board --set empz --template a.csv", "no set \"empz\"");
+  refused("board --recorded --rows r.csv", "exclude each other");
+  refused("board --predictions a.csv --name a,b", "without comma");
+  refused("board --predictions a.csv --name mine --page p.md", "--recorded");
+  refused("board --quick --page p.md", "a page needs the full run");
+  refused("001-models --page p.md", "--list, or the item board alone");
+}
+
+TEST_F(BoardCalls, WithUnusablePredictionsNameTheLine) {
+  std::ofstream(folder_.path("bad.csv")) << "set,recording,prediction_m\nemps,emps_val,0\n";
+  const Outcome outcome = torsio("reproduce board --predictions bad.csv --name mine");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("bad.csv: line 1"), HasSubstr("the column sample is missing")));
+}
+
+}  // namespace
+}  // namespace torsio
