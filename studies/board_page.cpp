@@ -19,7 +19,7 @@ Public recordings of actuators, each with a fixed split into training and test. 
 given the inputs of a test recording and no measured output but that of the first samples. Each table has published
 figures, the families of torsio, and the rows of all who joined, lowest error first.
 
-    torsio reproduce board                 # fits every family again: about ten minutes on two cores
+    torsio reproduce board                 # fits every family again: about half an hour on two cores
     torsio reproduce board --recorded      # the tables of this page, without a fit and without recordings
 
 The recordings are not part of torsio. They are read from the folder that `TORSIO_DATA` names, else from
@@ -56,7 +56,11 @@ writes the rows of a run, from which the program is built again; sets that were 
    missing column, another unit, an unknown set or recording, a scored sample that is missing, occurs twice or
    has no finite prediction are errors that name the line.
 4. To stay on this page, add the line that the call prints to `studies/board_rows.csv`, with the address of a
-   description or of the program in its last field, and open a pull request with the file of predictions attached.
+   description or of the program in its last field. Build the program again, sort the rows and write the page with
+
+       torsio reproduce board --recorded --rows studies/board_rows.csv --page docs/board.md
+
+   and open a pull request with the file of predictions attached.
 
 Rules: a prediction may use the inputs of its recording up to its sample, the target where the template states it, and
 the training part of the split. Settings are chosen within the training part. In `xl330_gain` all recordings are

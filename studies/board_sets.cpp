@@ -33,7 +33,7 @@ constexpr std::array kSources{
                            "https://www.nonlinearbenchmark.org",
                 .licence = "GPL-3 for the repository; that of the data was not verified",
                 .may_be_redistributed = false,
-                .columns = "t_s, vir_V, qm_m at 1 kHz"},
+                .columns = "t_s, vir_V, qm_m at 1 kHz; the motor's force is 35.15 N for each volt"},
     BoardSource{
         .folder = "desr_foot",
         .title = "DESR prosthetic ankle with a leaf spring and a switching cam on a dynamometer, "
@@ -249,7 +249,7 @@ std::string unpacked_content(const std::string& path) {
 std::string missing_file(const BoardSource& source, const std::string& folder) {
   for (const BoardFile& file : kFiles) {
     if (file.folder != source.folder) continue;
-    const std::string relative = fmt::format("{}/{}", file.folder, file.file);
+    std::string relative = fmt::format("{}/{}", file.folder, file.file);
     const std::string path = fmt::format("{}/{}", folder, relative);
     if (!std::filesystem::exists(path)) return relative;
     const std::string sha256 = sha256_hex(unpacked_content(path));

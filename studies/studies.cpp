@@ -162,7 +162,7 @@ constexpr std::array kStudies{
               "public recordings",
               "Published figures, every family and those who join, on public recordings",
               board,
-              12.0,
+              25.0,
               {},
               true}};
 

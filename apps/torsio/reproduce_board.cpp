@@ -98,9 +98,11 @@ void score_predictions(const BoardFlags& flags, const JsonOutput& json) {
                     score.samples, torsio::board_row_csv(row)));
 }
 
-void show_recorded(const std::string& page, const JsonOutput& json) {
+void show_recorded(const BoardFlags& flags, const std::string& page, const JsonOutput& json) {
   const std::vector<torsio::BoardRow> rows = known_rows();
-  if (!page.empty()) return write_text(page, torsio::board_page(rows));
+  if (!flags.rows.empty()) write_text(flags.rows, torsio::board_rows_csv(rows));
+  if (!page.empty()) write_text(page, torsio::board_page(rows));
+  if (!flags.rows.empty() || !page.empty()) return;
   std::vector<const torsio::BoardSet*> sets;
   for (const torsio::BoardSet& set : torsio::board_sets()) sets.push_back(&set);
   show_sets(sets, rows, json);
@@ -147,7 +149,11 @@ void BoardFlags::add(CLI::App& verb) {
   verb.add_flag("--recorded", is_recorded,
                 "show the tables of docs/board.md, or write that page, without a run")
       ->group(kGroup);
-  verb.add_option("--rows", rows, "write the rows of a run: studies/board_rows.csv")->group(kGroup);
+  verb.add_option(
+          "--rows", rows,
+          "write the rows of a run, or with --recorded those of the program in their order: "
+          "studies/board_rows.csv")
+      ->group(kGroup);
 }
 
 bool BoardFlags::is_used() const {
@@ -169,10 +175,10 @@ void reproduce_board(const BoardFlags& flags, const std::vector<std::string>& it
       {json.destination, page, flags.rows, flags.test_samples, flags.training_samples});
   const bool writes_samples = !flags.test_samples.empty() || !flags.training_samples.empty();
   const int jobs = (writes_samples ? 1 : 0) + (flags.predictions.empty() ? 0 : 1) +
-                   (flags.is_recorded ? 1 : 0) + (flags.rows.empty() ? 0 : 1);
+                   (flags.is_recorded || !flags.rows.empty() ? 1 : 0);
   if (jobs > 1)
     refuse_board("",
-                 "--template or --training, --predictions, --recorded and --rows exclude each "
+                 "--template or --training, --predictions, and --recorded or --rows exclude each "
                  "other");
   if (writes_samples == flags.set.empty())
     refuse_board("--set", "it belongs to --template or --training, and they need it");
@@ -182,6 +188,6 @@ void reproduce_board(const BoardFlags& flags, const std::vector<std::string>& it
     refuse_board("--page", "it is written from a run, or with --recorded");
   if (writes_samples) return write_samples(flags);
   if (!flags.predictions.empty()) return score_predictions(flags, json);
-  if (flags.is_recorded) return show_recorded(page, json);
+  if (flags.is_recorded) return show_recorded(flags, page, json);
   run_all(flags, options, page, json);
 }

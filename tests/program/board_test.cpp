@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 #include "program.hpp"
@@ -52,11 +53,23 @@ TEST_F(BoardCalls, WithOptionsThatDoNotBelongTogetherAreRefused) {
   refused("board --template a.csv", "they need it");
   refused("board --set emps", "it belongs to --template");
   refused("board --set empz --template a.csv", "no set \"empz\"");
-  refused("board --recorded --rows r.csv", "exclude each other");
+  refused("board --predictions a.csv --name mine --rows r.csv", "exclude each other");
   refused("board --predictions a.csv --name a,b", "without comma");
   refused("board --predictions a.csv --name mine --page p.md", "--recorded");
   refused("board --quick --page p.md", "a page needs the full run");
   refused("001-models --page p.md", "--list, or the item board alone");
+}
+
+TEST_F(BoardCalls, WriteTheRecordedRowsAndThePage) {
+  const Outcome outcome = torsio("reproduce board --recorded --rows r.csv --page p.md");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto repository_file = [](const char* name) {
+    std::ostringstream text;
+    text << std::ifstream(std::string(TORSIO_SOURCE "/") + name).rdbuf();
+    return text.str();
+  };
+  EXPECT_EQ(contents("r.csv"), repository_file("studies/board_rows.csv"));
+  EXPECT_EQ(contents("p.md"), repository_file("docs/board.md"));
 }
 
 TEST_F(BoardCalls, WithUnusablePredictionsNameTheLine) {

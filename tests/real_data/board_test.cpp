@@ -102,6 +102,7 @@ TEST_P(Board, HasTheTrainingSamplesOfItsSplit) {
 
 std::vector<std::string> set_names() {
   std::vector<std::string> names;
+  names.reserve(board_sets().size());
   for (const BoardSet& set : board_sets()) names.emplace_back(set.name);
   return names;
 }

@@ -144,13 +144,16 @@ Dataset small_dataset() {
   Recording recording("emps_val", 1000.0);
   std::vector<double> position_m;
   std::vector<double> voltage_V;
-  for (std::size_t n = 0; n < 30; ++n) {
+  constexpr std::size_t kSamples = 30;
+  position_m.reserve(kSamples);
+  voltage_V.reserve(kSamples);
+  for (std::size_t n = 0; n < kSamples; ++n) {
     position_m.push_back(0.5 * static_cast<double>(n));
     voltage_V.push_back(static_cast<double>(n % 3));
   }
   recording.add({.name = "vir_V", .values = voltage_V});
   recording.add({.name = "qm_m", .values = position_m});
-  dataset.records.push_back({std::move(recording), whole_record(30, Role::test)});
+  dataset.records.push_back({std::move(recording), whole_record(kSamples, Role::test)});
   return dataset;
 }
 
