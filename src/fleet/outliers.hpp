@@ -35,7 +35,7 @@ struct OutlierTest {
 struct OutlierOptions {
   OutlierSides sides = OutlierSides::both;
   /// A member is an outlier if fewer sound members than this are expected so far out.
-  double max_expected = 0.05;
+  double max_expected = 0.1;
   /// No value nearer to the median than this is an outlier: what the use does not notice.
   double tolerance = 0.0;
 };

@@ -30,7 +30,7 @@ std::vector<double> normal(std::size_t count, std::uint64_t seed) {
 }
 
 TEST(OutliersTest, SoundMembersOfAnyTailAreRarelyListed) {
-  // 0.05 are expected on each side of each population.
+  // At most 0.1 are expected on each side of each population: 8 in all.
   std::size_t of_uniform = 0;
   std::size_t of_normal = 0;
   constexpr std::size_t kPopulations = 40;
@@ -50,7 +50,7 @@ TEST(OutliersTest, PartsBeyondTheirToleranceAreFound) {
   EXPECT_TRUE(test.has_fitted_tails);
   for (const std::size_t member : planted) {
     EXPECT_TRUE(test.scores[member].is_outlier) << values[member];
-    EXPECT_LT(test.scores[member].expected, 0.05);
+    EXPECT_LT(test.scores[member].expected, 0.1);
   }
   EXPECT_EQ(count_of(test), planted.size());
   // The limit is near the end of the tolerance.
