@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "numerics/quantile.hpp"
@@ -102,8 +103,8 @@ StrokeKinds stroke_kinds(const TrainingData& data) {
     ++samples[kind];
     if (kind + 1U < count) longest_other = std::max(longest_other, durations[s][n]);
   });
-  const auto fewest = std::min_element(samples.begin(), samples.begin() + static_cast<int>(count));
-  if (static_cast<double>(*fewest) < kFew * static_cast<double>(used.size())) return found;
+  const std::size_t fewest = *std::ranges::min_element(std::span(samples).first(count));
+  if (static_cast<double>(fewest) < kFew * static_cast<double>(used.size())) return found;
   found.count = count;
   double squares = 0.0;
   for_each_place(data, [&](std::size_t s, std::size_t n) {
