@@ -339,11 +339,12 @@ void Checker::check_offsets() {
   });
 }
 
-/// The same offset as one of the deflection.
+/// The same offset as one of the deflection: torque over a deflection that is too large is too small.
 std::string Checker::zero_of_input_text(std::size_t r, double offset) const {
   const double slope = line_through(pairs_[r]).slope;
   if (!is_deflection(r) || !(std::abs(slope) > 0.0)) return {};
-  return fmt::format(", as if {} were {:.3g} rad off", spec_.inputs.front(), offset / slope);
+  return fmt::format(", as if about {:.3g} rad had been added to {}", -offset / slope,
+                     spec_.inputs.front());
 }
 
 void Checker::report_line(std::size_t r, const RecordLine& line, double spread) {
@@ -361,7 +362,10 @@ void Checker::report_line(std::size_t r, const RecordLine& line, double spread) 
         is_deflection(r)
             ? fmt::format(
                   "Remove the zero of each recording in the mapping, at rest without load:  "
-                  "{}  or that of {}, if its sensor drifts",
+                  "{}  or that of {}, if its sensor drifts. Where a recording does not begin at "
+                  "rest, an offset: of its channel corrects it; evaluate with a model states by "
+                  "how "
+                  "much",
                   zero_line(0.1), dataset_.target)
             : "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: "
               "0.1s}]");
