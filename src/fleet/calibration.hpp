@@ -73,7 +73,8 @@ struct FleetChoice {
 /// @throws Error naming file, line, what was expected and found.
 [[nodiscard]] CalibrationRequest read_fleet_list(const std::string& path);
 
-/// @throws UsageError unless there is either a list or specimens; as `read_fleet_list`.
+/// @throws UsageError unless there is either a list or specimens, with at most one fault for each; for a family that
+/// does not exist; as `read_fleet_list`.
 [[nodiscard]] CalibrationRequest calibration_request(const FleetChoice& choice);
 
 /// What was found about one joint.
@@ -116,10 +117,14 @@ struct FleetCalibration {
     std::string type;
     std::vector<std::size_t> members = {};             ///< in `FleetCalibration::joints`
     std::array<OutlierTest, kJointTraits> tests = {};  ///< values, or the logarithms of sizes
+    /// False: too few joints, none of which can be an outlier.
+    [[nodiscard]] bool is_compared() const noexcept;
   };
   std::vector<CalibratedJoint> joints = {};
   std::vector<OfType> types = {};
   std::vector<FleetOutlier> outliers = {};  ///< the least expected first
+  /// Whether a joint was compared with others of its type.
+  [[nodiscard]] bool is_compared(std::size_t joint) const noexcept;
 };
 
 /// The name of this kind in a store.
@@ -150,8 +155,8 @@ class CalibrationStudy : public StudyKind {
 
 /// The text of a request that is kept in a store, with the hashes of its files, which have to be there.
 [[nodiscard]] std::string calibration_text(const CalibrationRequest& request);
-/// Begins or resumes the study of that name. @throws UsageError as `StudyStore::create_or_resume`, Error if a
-/// recording has changed since it began.
+/// Begins or resumes the study of that name. @throws UsageError naming what differs if it is another calibration, or as
+/// `StudyStore::create_or_resume`; Error if a recording has changed since it began.
 [[nodiscard]] StoredStudy begin_calibration(StudyStore& store, const std::string& name,
                                             const CalibrationStudy& kind);
 /// The study of a store. Its trials refuse recordings that have changed since it began.

@@ -371,13 +371,22 @@ LoadOptions load_options(const CalibrationRequest& request, const Progress& prog
 StoredStudy begin_calibration(StudyStore& store, const std::string& name,
                               const CalibrationStudy& kind) {
   const CalibrationRequest& request = kind.request();
-  if (const auto known = store.find_study(name); known && known->kind == kCalibrationStudy)
+  const std::string text = calibration_text(request);
+  if (const auto known = store.find_study(name); known && known->kind == kCalibrationStudy) {
     for (const auto& [file, before] : calibration_from_text(known->spec).sha256)
       if (const auto now = request.sha256.find(file); now != request.sha256.end())
         refuse_changed_recording(file, before, now->second);
+    if (known->spec != text && known->torsio_version == kVersion)
+      throw UsageError(
+          {.place = store.address().name(),
+           .problem = fmt::format("study '{}' is another calibration; it differs in {}", name,
+                                  calibration_differences(known->spec, text)),
+           .advice = "Give this one a name of its own (--study NAME), or repeat the command that "
+                     "began the other one to continue it."});
+  }
   return store.create_or_resume({.name = name,
                                  .kind = std::string(kCalibrationStudy),
-                                 .spec = calibration_text(request),
+                                 .spec = text,
                                  .torsio_version = kVersion},
                                 kind.first_trials());
 }

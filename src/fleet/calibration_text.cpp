@@ -1,5 +1,8 @@
 #include "fleet/calibration_text.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -138,6 +141,36 @@ CalibrationRequest calibration_from_text(std::string_view text) {
       request.joints.push_back(joint_from(joint, request.sha256));
     if (!request.base.empty()) request.sha256[request.base] = json.at("base_sha256");
     return request;
+  } catch (const FleetJson::exception&) {
+    refuse_text("what it calibrates");
+  }
+}
+
+std::string calibration_differences(std::string_view before, std::string_view now) {
+  constexpr auto kParts = std::to_array<std::pair<const char*, const char*>>(
+      {{"joints", "the joints or their recordings"},
+       {"simulated", "the specimens"},
+       {"mapping", "mapping"},
+       {"rate_Hz", "sample_rate_Hz"},
+       {"target", "target"},
+       {"inputs", "inputs"},
+       {"model", "model"},
+       {"base", "base"},
+       {"seed", "seed"},
+       {"only_compares", "only-compare"}});
+  try {
+    const FleetJson a = FleetJson::parse(before);
+    const FleetJson b = FleetJson::parse(now);
+    std::string text;
+    for (const auto& [key, what] : kParts) {
+      const FleetJson was = a.value(key, FleetJson());
+      const FleetJson is = b.value(key, FleetJson());
+      if (was == is) continue;
+      text += fmt::format("{}{}", text.empty() ? "" : ", ", what);
+      if (was.is_primitive() && is.is_primitive() && !was.is_null() && !is.is_null())
+        text += fmt::format(" ({}, now {})", was.dump(), is.dump());
+    }
+    return text.empty() ? "its description" : text;
   } catch (const FleetJson::exception&) {
     refuse_text("what it calibrates");
   }

@@ -19,6 +19,9 @@ using FileHashes = std::map<std::string, std::string>;
 /// @throws Error if the text is not of `calibration_text`.
 [[nodiscard]] CalibrationRequest calibration_from_text(std::string_view text);
 
+/// In what two texts of `calibration_text` differ, for a person: "the joints or their recordings, seed (1, now 2)".
+[[nodiscard]] std::string calibration_differences(std::string_view before, std::string_view now);
+
 /// The result of a joint as JSON from which `joint_from_text` makes the same numbers.
 [[nodiscard]] std::string joint_text(const CalibratedJoint& joint);
 /// @throws Error if the text is not of `joint_text`.

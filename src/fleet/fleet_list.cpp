@@ -8,6 +8,7 @@
 #include "fleet/calibration.hpp"
 #include "search/specimen_study.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/fit/families.hpp"
 
 namespace torsio {
 namespace {
@@ -76,6 +77,23 @@ CalibrationRequest read_fleet_list(const std::string& path) {
   return request;
 }
 
+namespace {
+
+void check_faults(const FleetChoice& choice, const CalibrationRequest& request) {
+  if (choice.faults == 0) return;
+  if (!request.simulated)
+    throw UsageError({.place = "--faults",
+                      .problem = "only simulated joints can be given a fault",
+                      .advice = "Use --specimens in place of a list."});
+  if (const std::uint64_t count = request.simulated->last + 1 - request.simulated->first;
+      choice.faults > count)
+    throw UsageError({.place = "--faults",
+                      .expected = fmt::format("at most {}, one for each specimen", count),
+                      .found = fmt::format("{}", choice.faults)});
+}
+
+}  // namespace
+
 CalibrationRequest calibration_request(const FleetChoice& choice) {
   if (choice.list.empty() == choice.specimens.empty())
     throw UsageError({.place = "fleet calibrate",
@@ -92,8 +110,11 @@ CalibrationRequest calibration_request(const FleetChoice& choice) {
                          .last = range.last,
                          .faults = choice.faults};
   }
+  check_faults(choice, request);
   if (!choice.base.empty()) request.base = choice.base;
   if (!choice.model.empty()) request.model = choice.model;
+  // Refused here and not once for each joint, when the study has its name already.
+  static_cast<void>(find_family(request.model.substr(0, request.model.find(':'))));
   request.seed = choice.seed;
   request.only_compares = choice.only_compares;
   return request;

@@ -61,6 +61,17 @@ void add_outliers(FleetCalibration& fleet, const FleetCalibration::OfType& type)
 
 }  // namespace
 
+bool FleetCalibration::OfType::is_compared() const noexcept {
+  return std::ranges::any_of(tests,
+                             [](const OutlierTest& test) { return std::isfinite(test.highest); });
+}
+
+bool FleetCalibration::is_compared(std::size_t joint) const noexcept {
+  return std::ranges::any_of(types, [&](const OfType& type) {
+    return type.is_compared() && std::ranges::find(type.members, joint) != type.members.end();
+  });
+}
+
 void find_fleet_outliers(FleetCalibration& fleet) {
   fleet.types.clear();
   fleet.outliers.clear();

@@ -113,6 +113,24 @@ std::string plural(std::size_t count, const char* one) {
   return fmt::format("{} {}{}", count, one, count == 1 ? "" : "s");
 }
 
+/// How many differ from the others, or that none could.
+std::string difference_text(const FleetCalibration& fleet) {
+  std::size_t compared = 0;
+  std::size_t alone = 0;  // joints of a type with too few
+  for (const FleetCalibration::OfType& type : fleet.types)
+    (type.is_compared() ? compared : alone) += type.members.size();
+  if (compared + alone == 0) return {};
+  if (compared == 0)
+    return fmt::format("; not compared with each other ({}, 8 of a type are needed)",
+                       plural(alone, "joint"));
+  std::string text =
+      fleet.outliers.size() == 1
+          ? "; 1 differs from the others of its type"
+          : fmt::format("; {} differ from the others of their type", fleet.outliers.size());
+  if (alone > 0) text += fmt::format(", {} not compared (8 of a type are needed)", alone);
+  return text;
+}
+
 std::string head_text(const FleetCalibration& fleet) {
   const auto count_of = [&](const auto& is_counted) {
     return static_cast<std::size_t>(std::ranges::count_if(fleet.joints, is_counted));
@@ -122,12 +140,12 @@ std::string head_text(const FleetCalibration& fleet) {
   const std::size_t models =
       count_of([](const CalibratedJoint& joint) { return !joint.chosen.empty(); });
   const std::size_t sound = fleet.joints.size() - failed;
-  return fmt::format(
-      "{}: {}, {}; {} from the others of its type", plural(fleet.joints.size(), "joint"),
-      models == 0 ? fmt::format("{} compared", sound) : fmt::format("{} with a model", models),
-      models == 0 ? fmt::format("{} not", failed)
-                  : fmt::format("{} without", fleet.joints.size() - models),
-      fleet.outliers.size() == 1 ? "1 differs" : fmt::format("{} differ", fleet.outliers.size()));
+  const bool is_measured_only = models == 0 && sound > 0;
+  return fmt::format("{}: {}{}", plural(fleet.joints.size(), "joint"),
+                     is_measured_only ? fmt::format("{} measured, {} not", sound, failed)
+                                      : fmt::format("{} with a model, {} without", models,
+                                                    fleet.joints.size() - models),
+                     difference_text(fleet));
 }
 
 /// How many of the planted faults were found.
@@ -136,12 +154,15 @@ struct PlantedFaults {
   std::size_t found = 0;
   std::size_t right = 0;  ///< with their kind
   std::size_t sound = 0;  ///< sound joints that are listed
+  bool can_be_found = false;
 };
 
 PlantedFaults planted_in(const FleetCalibration& fleet) {
   PlantedFaults faults;
   faults.planted = static_cast<std::size_t>(std::ranges::count_if(
       fleet.joints, [](const CalibratedJoint& joint) { return !joint.fault.empty(); }));
+  for (std::size_t i = 0; i < fleet.joints.size(); ++i)
+    faults.can_be_found |= !fleet.joints[i].fault.empty() && fleet.is_compared(i);
   for (const FleetOutlier& outlier : fleet.outliers) {
     const CalibratedJoint& joint = fleet.joints[outlier.joint];
     if (joint.fault.empty()) {
@@ -158,8 +179,12 @@ std::string planted_text(const FleetCalibration& fleet) {
   const PlantedFaults faults = planted_in(fleet);
   if (faults.planted == 0) return {};
   std::string text =
-      fmt::format("planted faults: {} of {} found, {} of them with the right kind; {} listed\n",
-                  faults.found, faults.planted, faults.right, plural(faults.sound, "sound joint"));
+      faults.can_be_found
+          ? fmt::format(
+                "planted faults: {} of {} found, {} of them with the right kind; {} listed\n",
+                faults.found, faults.planted, faults.right, plural(faults.sound, "sound joint"))
+          : fmt::format("planted faults: 0 of {} found: fewer than 8 joints cannot be compared\n",
+                        faults.planted);
   for (std::size_t i = 0; i < fleet.joints.size(); ++i)
     if (!fleet.joints[i].fault.empty() &&
         std::ranges::find(fleet.outliers, i, &FleetOutlier::joint) == fleet.outliers.end())
@@ -179,9 +204,7 @@ FleetTextJson planted_json(const FleetCalibration& fleet) {
 std::string tails_text(const FleetCalibration::OfType& type) {
   const bool is_fitted = std::ranges::any_of(type.tests, &OutlierTest::has_fitted_tails);
   if (is_fitted) return "limits: by the tails of the joints themselves";
-  const bool has_limits = std::ranges::any_of(
-      type.tests, [](const OutlierTest& test) { return std::isfinite(test.highest); });
-  return has_limits
+  return type.is_compared()
              ? "limits: fewer than 100 joints do not show their tails; a normal distribution "
                "is assumed"
              : "no limits: fewer than 8 joints cannot be compared";
@@ -301,6 +324,7 @@ std::string fleet_json(const FleetCalibration& fleet) {
     }
     types.push_back({{"type", text_or_null(type.type)},
                      {"joints", type.members.size()},
+                     {"is_compared", type.is_compared()},
                      {"traits", std::move(tests)}});
   }
   FleetTextJson outliers = FleetTextJson::array();

@@ -52,7 +52,12 @@ RegisteredFleet register_fleet(Registry& registry, StudyStore& store, const Flee
       result.refused.push_back(joint.serial + ": it differs from the others of its type");
       continue;
     }
-    if (registry.promote(joint.serial, model, by, "fleet calibrate")) ++result.promoted;
+    if (!registry.promote(joint.serial, model, by, "fleet calibrate")) {
+      ++result.current_before;
+      continue;
+    }
+    ++result.promoted;
+    if (!fleet.is_compared(i)) result.not_compared.push_back(joint.serial);
   }
   return result;
 }

@@ -12,6 +12,9 @@ namespace torsio {
 struct RegisteredFleet {
   std::size_t models = 0;
   std::size_t promoted = 0;
+  std::size_t current_before = 0;  ///< models that were current already
+  /// Joints whose model became current though they were not compared with others of their type: these are too few.
+  std::vector<std::string> not_compared = {};
   /// Joints whose model was not made current, with the reason.
   std::vector<std::string> refused = {};
 };

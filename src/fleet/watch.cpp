@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "evaluate/drift/verdicts.hpp"
@@ -214,6 +216,36 @@ class ListWatch {
   std::vector<std::string> failures_;
 };
 
+WatchedJoint watched(Registry& registry, const DeviceSummary& summary) {
+  WatchedJoint joint{.serial = summary.device.serial, .type = summary.device.type};
+  if (summary.current) joint.model = summary.current->id;
+  std::vector<DriftEntry> history = registry.drift_history(joint.serial);
+  // A comparison with an earlier model does not show how the current one has drifted.
+  joint.earlier_comparisons =
+      std::erase_if(history, [&](const DriftEntry& entry) { return joint.model != entry.model; });
+  joint.comparisons = history.size();
+  if (history.empty()) return joint;
+  joint.last = history.back();
+  joint.severity = severity_of(history.back());
+  const WatchJson details = details_of(history.back());
+  joint.worst = details.value("worst", std::string());
+  joint.advice = details.value("advice", std::string());
+  if (details.contains("calibration_rmse") && details["calibration_rmse"].is_number())
+    joint.error_ratio = history.back().rmse / details["calibration_rmse"].get<double>();
+  if (history.size() > 1) joint.severity_before = severity_of(history[history.size() - 2]);
+  return joint;
+}
+
+/// The lowest first: what there is something to do about, what is open, what is sound, what was not compared.
+int urgency(const WatchedJoint& joint) {
+  if (!joint.last) return 3;
+  if (joint.last->verdict == name(DriftVerdict::changed)) return 0;
+  for (const DriftAdvice advice :
+       {DriftAdvice::calibrate, DriftAdvice::set_zero, DriftAdvice::check_sensor})
+    if (joint.advice == name(advice)) return 0;
+  return joint.last->verdict == name(DriftVerdict::not_changed) ? 2 : 1;
+}
+
 }  // namespace
 
 void watch_joint(Registry& registry, const FleetJoint& joint, const CalibrationRequest& request,
@@ -228,26 +260,14 @@ std::vector<std::string> watch_joints(Registry& registry, const CalibrationReque
 
 std::vector<WatchedJoint> rank_by_drift(Registry& registry) {
   std::vector<WatchedJoint> joints;
-  for (const DeviceSummary& summary : registry.summaries()) {
-    WatchedJoint joint{.serial = summary.device.serial, .type = summary.device.type};
-    if (summary.current) joint.model = summary.current->id;
-    const std::vector<DriftEntry> history = registry.drift_history(joint.serial);
-    joint.comparisons = history.size();
-    if (!history.empty()) {
-      joint.last = history.back();
-      joint.severity = severity_of(history.back());
-      const WatchJson details = details_of(history.back());
-      joint.worst = details.value("worst", std::string());
-      joint.advice = details.value("advice", std::string());
-    }
-    if (history.size() > 1) joint.severity_before = severity_of(history[history.size() - 2]);
-    joints.push_back(std::move(joint));
-  }
-  std::ranges::stable_sort(joints, [](const WatchedJoint& a, const WatchedJoint& b) {
-    const auto rank = [](const WatchedJoint& joint) {
-      return std::isfinite(joint.severity) ? -joint.severity : 1.0;
+  const std::vector<DeviceSummary> summaries = registry.summaries();
+  joints.reserve(summaries.size());
+  for (const DeviceSummary& summary : summaries) joints.push_back(watched(registry, summary));
+  std::ranges::stable_sort(joints, {}, [](const WatchedJoint& joint) {
+    const auto descending = [](double value) {
+      return std::isfinite(value) ? -value : std::numeric_limits<double>::infinity();
     };
-    return rank(a) < rank(b);
+    return std::tuple(urgency(joint), descending(joint.severity), descending(joint.error_ratio));
   });
   return joints;
 }

@@ -19,13 +19,15 @@ struct WatchedJoint {
   std::string serial;
   std::string type = {};
   std::optional<std::int64_t> model = {};  ///< that is current; none: it has none
-  std::optional<DriftEntry> last = {};     ///< none: it was never compared
-  /// Largest change over the smallest that counts: from 1 on the joint has changed, if the interval allows it.
+  std::optional<DriftEntry> last = {};     ///< with the current model; none: it was never compared
+  /// Certain part of the largest change, also of the zero, over the smallest that counts.
   double severity = kNotMeasured;
   std::string worst = {};                 ///< which change that is, "stiffness -8.1 %"
   std::string advice = {};                ///< what the last comparison advises
-  std::size_t comparisons = 0;            ///< in the history
-  double severity_before = kNotMeasured;  ///< severity in the comparison before
+  double error_ratio = kNotMeasured;      ///< RMSE over that of the calibration
+  std::size_t comparisons = 0;            ///< with the current model
+  std::size_t earlier_comparisons = 0;    ///< with models that were current before
+  double severity_before = kNotMeasured;  ///< in the comparison with the same model before
 };
 
 /// Compares the recordings of a joint with its current model (`detect_drift`), and adds the result to the history.
@@ -43,7 +45,9 @@ void watch_joint(Registry& registry, const FleetJoint& joint, const CalibrationR
                                                     std::size_t threads = 0,
                                                     const Progress& progress = {});
 
-/// All joints of the registry, the largest drift first; those never compared last.
+/// All joints of the registry: first those that have changed or whose advice is to do something at the joint, then
+/// those that cannot be determined, those that have not changed, and those whose current model was never compared;
+/// among these the largest severity first, then the largest error.
 [[nodiscard]] std::vector<WatchedJoint> rank_by_drift(Registry& registry);
 
 }  // namespace torsio

@@ -15,8 +15,12 @@ namespace torsio {
 namespace {
 
 constexpr const char* kSeverity =
-    "severity: the certain part of the largest change over the smallest change that counts; from 1 "
-    "on the joint has changed";
+    "severity: the certain part of the largest change, also of the zero, over the smallest change "
+    "that counts";
+constexpr const char* kVerdict =
+    "verdict: that of the joint alone, without the zero; changed: a change is certainly larger "
+    "than "
+    "what a joint without one shows, which is less than the change that counts";
 
 std::string number_or_dash(double value, const char* unit, double scale = 1.0) {
   return std::isfinite(value) ? fmt::format("{:+.3g}{}", scale * value, unit) : "-";
@@ -29,8 +33,11 @@ TextTable watch_table(const std::vector<WatchedJoint>& joints) {
                 "RMSE", "advice"});
   for (const WatchedJoint& joint : joints) {
     if (!joint.last) {
-      table.row({joint.serial, "-", "-", "never compared", "", "-", "-", "-",
-                 joint.model ? "" : "no model is current"});
+      table.row({joint.serial, "-", "-",
+                 joint.model && joint.earlier_comparisons > 0
+                     ? fmt::format("never compared with model {}", *joint.model)
+                     : "never compared",
+                 "", "-", "-", "-", joint.model ? "" : "no model is current"});
       continue;
     }
     const auto plain = [](double value) {
@@ -49,7 +56,7 @@ TextTable watch_table(const std::vector<WatchedJoint>& joints) {
 
 std::string watch_text(const std::vector<WatchedJoint>& joints) {
   if (joints.empty()) return "no joint is in the registry\n";
-  return fmt::format("{}{}\n", watch_table(joints).text(), kSeverity);
+  return fmt::format("{}{}\n{}\n", watch_table(joints).text(), kSeverity, kVerdict);
 }
 
 std::string watch_json(const std::vector<WatchedJoint>& joints,
@@ -60,6 +67,7 @@ std::string watch_json(const std::vector<WatchedJoint>& joints,
                                 {"type", text_or_null(joint.type)},
                                 {"model", nullptr},
                                 {"comparisons", joint.comparisons},
+                                {"earlier_comparisons", joint.earlier_comparisons},
                                 {"severity", json_number(joint.severity)},
                                 {"severity_before", json_number(joint.severity_before)},
                                 {"largest_change", text_or_null(joint.worst)},
@@ -82,7 +90,7 @@ ReportDocument watch_report(const std::vector<WatchedJoint>& joints) {
     severity.names.push_back(joint.serial);
   }
   ReportDocument document{.title = "Drift of a fleet",
-                          .summary = {fmt::format("{}.", kSeverity)},
+                          .summary = {fmt::format("{}.", kSeverity), fmt::format("{}.", kVerdict)},
                           .sections = {},
                           .origin = {}};
   document.sections.push_back({.heading = "Joints by drift",

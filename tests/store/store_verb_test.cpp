@@ -140,6 +140,13 @@ TEST_F(StoreVerb, ShowsFromWhichModelOneWasTransferred) {
       "--store other.sqlite --promote");
   EXPECT_THAT(done("store show 'dfki-50#0002' --store other.sqlite"),
               HasSubstr("base of model 1: a file that is not in this store, SHA-256 " + sha256));
+
+  // Also where no model is current.
+  done(
+      "fleet calibrate --specimens 'dfki-50#0002..#0002' --model linear --base base.safetensors "
+      "--store third.sqlite");
+  EXPECT_THAT(done("store show 'dfki-50#0002' --store third.sqlite"),
+              AllOf(HasSubstr("no model is current"), HasSubstr("base of model 1: a file")));
 }
 
 TEST_F(StoreVerb, RefusesFilesOfOtherDevices) {

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -64,16 +65,45 @@ void write_pages(const std::string& folder, const torsio::FleetCalibration& flee
   remark(fmt::format("a page for each of {} joints written to {}", fleet.joints.size(), folder));
 }
 
+std::string registered_text(const torsio::RegisteredFleet& added, const std::string& store,
+                            bool promotes) {
+  const bool is_one = added.models == 1;
+  std::string text = fmt::format("{} {} in the registry of {}", added.models,
+                                 is_one ? "model is" : "models are", store);
+  if (!promotes)
+    return text + (is_one ? "; --promote makes it current" : "; --promote makes them current");
+  if (added.promoted > 0 || added.current_before == 0)
+    text += fmt::format(", {} became current", added.promoted);
+  if (added.current_before > 0)
+    text += fmt::format(", {} {} current before", added.current_before,
+                        added.current_before == 1 ? "was" : "were");
+  return text;
+}
+
 void register_joints(const CalibrateFlags& flags, torsio::StudyStore& store,
                      const torsio::FleetCalibration& fleet,
                      const torsio::CalibrationRequest& request) {
   torsio::Registry registry(store.address(), wait_for_server);
   const torsio::RegisteredFleet added =
       torsio::register_fleet(registry, store, fleet, request, flags.promotes, person_here());
-  remark(fmt::format("{} models are in the registry of {}{}", added.models, store.address().name(),
-                     flags.promotes ? fmt::format(", {} became current", added.promoted)
-                                    : "; --promote makes them current"));
+  remark(registered_text(added, store.address().name(), flags.promotes));
   for (const std::string& refused : added.refused) remark("not made current: " + refused);
+  if (!added.not_compared.empty())
+    remark(fmt::format(
+        "made current without a comparison with other joints, of which 8 of a type are needed: {}",
+        fmt::join(added.not_compared, ", ")));
+}
+
+/// After all results are written: the exit code is that of `fleet watch`.
+void require_models(const CalibrateFlags& flags, const torsio::FleetCalibration& fleet) {
+  const auto failed = std::ranges::count_if(
+      fleet.joints, [](const torsio::CalibratedJoint& joint) { return !joint.failure.empty(); });
+  if (failed == 0) return;
+  throw torsio::Error({.place = flags.fleet.list.empty() ? flags.fleet.specimens : flags.fleet.list,
+                       .problem = fmt::format("{} of {} joints {}", failed, fleet.joints.size(),
+                                              flags.fleet.only_compares ? "could not be compared"
+                                              : failed == 1             ? "has no model"
+                                                                        : "have no model")});
 }
 
 void calibrate(CalibrateFlags& flags) {
@@ -91,6 +121,7 @@ void calibrate(CalibrateFlags& flags) {
   const std::string name = flags.worker.study.empty() ? "calibrate" : flags.worker.study;
   const torsio::StoredStudy study = torsio::begin_calibration(store, name, kind);
   take_back_of_dead(store, study);
+  if (!is_kept(flags)) remark("nothing is kept if this is stopped; --store FILE.sqlite keeps it");
   ProgressBar progress;
   torsio::run_workers(store, study, kind, flags.worker.options(), progress.listener());
   const torsio::FleetCalibration fleet = torsio::calibration_result(store, study);
@@ -98,6 +129,7 @@ void calibrate(CalibrateFlags& flags) {
   if (flags.json.wants_tables()) print(torsio::fleet_text(fleet));
   if (is_kept(flags)) register_joints(flags, store, fleet, kind.request());
   if (!flags.pages.empty()) write_pages(flags.pages, fleet);
+  require_models(flags, fleet);
 }
 
 void watch(WatchFlags& flags) {

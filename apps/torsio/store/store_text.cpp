@@ -176,10 +176,11 @@ std::string device_text(const DeviceRecord& record) {
       steps.push_back(fmt::format("model {} ({}{})", each.id, each.family,
                                   each.device == device.serial ? "" : " of " + each.device));
     text += fmt::format("current: {}\n", fmt::join(steps, ", made from "));
-    for (const torsio::RegisteredModel& each : record.lineage)
-      if (!each.base_sha256.empty())
-        text += fmt::format("base of model {}: {}\n", each.id, base_text(each, record.bases));
   }
+  for (const torsio::RegisteredModel& each :
+       record.lineage.empty() ? record.models : record.lineage)
+    if (!each.base_sha256.empty())
+      text += fmt::format("base of model {}: {}\n", each.id, base_text(each, record.bases));
   if (!record.models.empty()) text += "\nmodels\n" + models_text(record.models, false);
   if (!record.promotions.empty()) text += "\npromotions\n" + promotions_text(record.promotions);
   if (!record.drift.empty()) text += "\ndrift\n" + drift_rows_text(record.drift);
