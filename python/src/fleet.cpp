@@ -1,7 +1,9 @@
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "bindings.hpp"
@@ -23,6 +25,18 @@ namespace {
 
 using FleetJson = nlohmann::ordered_json;
 
+/// Opening a SQLite file that does not exist would create it, at a misspelt path too.
+StoreAddress existing_store(const std::string& address) {
+  StoreAddress found = store_address(address);
+  std::error_code absent;
+  if (found.kind == StoreAddress::Kind::sqlite && !std::filesystem::exists(found.target, absent))
+    throw UsageError({.place = found.name(),
+                      .problem = "there is no store",
+                      .advice = "Correct the path; calibrate_fleet(store=...) and "
+                                "Study.search(store=...) begin one."});
+  return found;
+}
+
 StoredStudy stored(StudyStore& store, const std::string& name) {
   if (const auto study = store.find_study(name)) return *study;
   std::string names;
@@ -34,7 +48,7 @@ StoredStudy stored(StudyStore& store, const std::string& name) {
 }
 
 std::string study_list(const std::string& address) {
-  StudyStore store(store_address(address));
+  StudyStore store(existing_store(address));
   FleetJson list = FleetJson::array();
   for (const StoredStudy& study : store.studies()) {
     const StudyCounts counts = store.counts(study.id);
@@ -49,7 +63,7 @@ std::string study_list(const std::string& address) {
 }
 
 std::string study_trials(const std::string& address, const std::string& name) {
-  StudyStore store(store_address(address));
+  StudyStore store(existing_store(address));
   FleetJson list = FleetJson::array();
   for (const TrialRecord& record : store.trials(stored(store, name).id))
     list.push_back({{"trial", record.id},
@@ -69,7 +83,7 @@ std::string study_trials(const std::string& address, const std::string& name) {
 std::pair<std::size_t, std::size_t> study_work(const std::string& address, const std::string& name,
                                                std::size_t threads) {
   return interruptible([&](const Progress& progress) {
-    StudyStore store(store_address(address));
+    StudyStore store(existing_store(address));
     const StoredStudy study = stored(store, name);
     const std::unique_ptr<StudyKind> kind = make_study_kind(study, progress);
     const WorkersReport report = run_workers(store, study, *kind, {.threads = threads}, progress);
@@ -115,7 +129,7 @@ std::string calibrate_fleet(const FleetChoice& choice, const std::string& addres
 /// As `torsio fleet watch`.
 std::string watch_fleet(const std::string& list, const std::string& address, std::size_t threads) {
   return interruptible([&](const Progress& progress) {
-    Registry registry(store_address(address));
+    Registry registry(existing_store(address));
     std::vector<std::string> failures;
     if (!list.empty()) failures = watch_joints(registry, read_fleet_list(list), threads, progress);
     return watch_json(rank_by_drift(registry), failures);
@@ -123,7 +137,7 @@ std::string watch_fleet(const std::string& list, const std::string& address, std
 }
 
 std::string registry_devices(const std::string& address) {
-  Registry registry(store_address(address));
+  Registry registry(existing_store(address));
   FleetJson list = FleetJson::array();
   for (const DeviceSummary& of : registry.summaries()) {
     FleetJson json{{"serial", of.device.serial},
@@ -142,7 +156,7 @@ std::string registry_devices(const std::string& address) {
 }
 
 std::string registry_models(const std::string& address, const std::string& serial) {
-  Registry registry(store_address(address));
+  Registry registry(existing_store(address));
   FleetJson list = FleetJson::array();
   for (const RegisteredModel& of : registry.models(serial)) {
     FleetJson json{{"model", of.id},      {"serial", of.device},
@@ -160,7 +174,7 @@ std::string registry_models(const std::string& address, const std::string& seria
 }
 
 std::string registry_drift(const std::string& address, const std::string& serial) {
-  Registry registry(store_address(address));
+  Registry registry(existing_store(address));
   FleetJson list = FleetJson::array();
   for (const DriftEntry& of : registry.drift_history(serial))
     list.push_back({{"found_at_s", of.found_at_s},
@@ -180,7 +194,7 @@ std::string registry_drift(const std::string& address, const std::string& serial
 /// The current model of a device, or the one with that number.
 Model registry_model(const std::string& address, const std::string& serial,
                      std::optional<std::int64_t> id) {
-  Registry registry(store_address(address));
+  Registry registry(existing_store(address));
   if (!id) {
     const auto current = registry.current(serial);
     if (!current)
@@ -246,14 +260,14 @@ void bind_fleet(py::module_& module) {
       "registry_promote",
       [](const std::string& store, const std::string& serial, std::int64_t model,
          const std::string& reason) {
-        Registry registry(store_address(store));
+        Registry registry(existing_store(store));
         return registry.promote(serial, model, "Python", reason);
       },
       py::arg("store"), py::arg("serial"), py::arg("model"), py::arg("reason"));
   module.def(
       "registry_roll_back",
       [](const std::string& store, const std::string& serial, const std::string& reason) {
-        Registry registry(store_address(store));
+        Registry registry(existing_store(store));
         return registry.roll_back(serial, "Python", reason);
       },
       py::arg("store"), py::arg("serial"), py::arg("reason"));

@@ -1,6 +1,7 @@
 """Studies, the registry and fleets."""
 
 import math
+import re
 
 import pytest
 
@@ -48,6 +49,32 @@ def test_each_joint_of_a_list_gets_a_model_in_the_registry(fleet_list, tmp_path)
     assert study.counts == {"done": 2}
     assert study.work() == 0
     assert list(torsio.Study.all(store)["name"]) == ["calibrate"]
+
+
+@pytest.mark.parametrize(
+    "opened",
+    [
+        torsio.Registry,
+        torsio.watch_fleet,
+        torsio.Study.all,
+        lambda store: torsio.Study(store, "calibrate"),
+    ],
+)
+def test_a_store_that_does_not_exist_is_refused_and_not_created(opened, tmp_path):
+    store = tmp_path / "misspelt.sqlite"
+    with pytest.raises(torsio.UsageError, match=re.escape(f"{store}: there is no store")):
+        opened(store)
+    assert not store.exists()
+
+
+def test_a_joint_that_could_not_be_compared_is_warned_of(fleet_list, tmp_path):
+    store = tmp_path / "robot.sqlite"
+    torsio.calibrate_fleet(fleet_list, model="linear_coulomb", store=store, threads=1)
+    with pytest.warns(UserWarning, match="(?s)could not be compared: 2.*J03: .*J04: ") as caught:
+        ranked = torsio.watch_fleet(store, fleet_list, threads=1)
+    assert [warning.filename for warning in caught] == [__file__]
+    assert [failure[:3] for failure in ranked.attrs["failures"]] == ["J03", "J04"]
+    assert list(ranked["comparisons"]) == [0, 0]
 
 
 def test_simulated_specimens_need_no_list():

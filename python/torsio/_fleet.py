@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
@@ -24,7 +25,7 @@ class Study:
     """A study that a store keeps: trials, their states and their results (docs/search.md).
 
     store: SQLite file or postgresql:// URL. name: of the study, as `torsio search --study` has it.
-    Errors: UsageError if the store has no study of that name.
+    Errors: UsageError if there is no store, or no study of that name in it.
     """
 
     def __init__(self, store: Path, name: str) -> None:
@@ -114,6 +115,7 @@ class Registry:
     """Devices with their models and their drift, as `torsio store` shows them (docs/fleet.md).
 
     store: SQLite file or postgresql:// URL. A model is served only to its own device.
+    Errors: UsageError if there is no store; `calibrate_fleet` and `torsio store add` begin one.
     """
 
     def __init__(self, store: Path) -> None:
@@ -220,6 +222,9 @@ def watch_fleet(store: Path, joints: Path = "", *, threads: int = 0, progress: L
     """A DataFrame of the joints of a registry, the largest drift first, as `torsio fleet watch`.
 
     joints: list with recordings of today, which are compared first. threads: 0 for one for each core.
+    Joints of the list that could not be compared are in `.attrs["failures"]`, each with the reason; a UserWarning has
+    the same texts. A row of such a joint is that of its last comparison before.
+    Errors: UsageError if there is no store.
     """
     with shown(progress):
         document = json.loads(_core.watch_fleet(fspath(joints), _store(store), threads))
@@ -227,5 +232,8 @@ def watch_fleet(store: Path, joints: Path = "", *, threads: int = 0, progress: L
         for key in ("severity", "severity_before"):
             row[key] = _number(row[key])
     frame = _data_frame(document["joints"])
-    frame.attrs["failures"] = document["failures"]
+    failures = document["failures"]
+    frame.attrs["failures"] = failures
+    if failures:
+        warnings.warn(f"joints that could not be compared: {len(failures)}\n" + "\n".join(failures), stacklevel=2)
     return frame

@@ -11,6 +11,7 @@
 #include "search/scored_model_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
@@ -48,6 +49,15 @@ SpecimenRequest specimen_range(std::string_view text) {
                       .expected = fmt::format("1 to {} serial numbers in rising order", kMost),
                       .found = '"' + std::string(text) + '"'});
   return request;
+}
+
+SpecimenStudy::SpecimenStudy(SpecimenRequest request) : request_(std::move(request)) {
+  const std::string& model = request_.model;
+  if (model == "all" || model == kSearch || split_inputs(model).size() != 1)
+    throw UsageError({.place = "--models",
+                      .expected = "one model, with its settings or without: each specimen gets one",
+                      .found = '"' + model + '"',
+                      .advice = "Run one study for each model."});
 }
 
 std::vector<Trial> SpecimenStudy::first_trials() const {

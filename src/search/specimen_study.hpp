@@ -34,7 +34,8 @@ inline constexpr std::string_view kSpecimenStudy = "specimens";
 /// its RMSE on the second is the value.
 class SpecimenStudy : public StudyKind {
  public:
-  explicit SpecimenStudy(SpecimenRequest request) : request_(std::move(request)) {}
+  /// @throws UsageError if `request.model` is several models.
+  explicit SpecimenStudy(SpecimenRequest request);
 
   [[nodiscard]] std::vector<Trial> first_trials() const;
   [[nodiscard]] TrialResult run(const Claim& claim, const Progress& progress) override;

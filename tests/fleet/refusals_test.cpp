@@ -26,6 +26,8 @@ class WorkRefuses : public Program {
   }
 };
 
+using SearchStates = Program;
+
 constexpr const char* kSpecimens =
     "search --specimens 'dfki-50#0001..#0003' --models linear --duration 4s --study line --store "
     "s.sqlite --threads 1";
@@ -85,6 +87,46 @@ TEST_F(WorkRefuses, AStudyThatDoesNotExist) {
   const Outcome outcome = torsio("work --store s.sqlite --study absent");
   EXPECT_EQ(outcome.exit_code, kWorkFailed);
   EXPECT_THAT(outcome.err, HasSubstr("there is no study 'absent'"));
+}
+
+TEST_F(WorkRefuses, AStoreIsWaitedForAndNotCreated) {
+  ASSERT_EQ(torsio(kSpecimens).exit_code, 0);
+  change("UPDATE trials SET state = 0; DELETE FROM results");
+  const Outcome outcome = shell(
+      "{torsio} work --store later.sqlite --wait --threads 1 & worker=$!; sleep 1; "
+      "test -e later.sqlite && echo created; mv s.sqlite later.sqlite; "
+      "for k in $(seq 300); do grep -q 'finished here' err.txt && break; sleep 0.1; done; "
+      "kill $worker; wait");
+  EXPECT_THAT(outcome.out, Not(HasSubstr("created")));
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("later.sqlite: there is no such store yet"),
+                                 HasSubstr("study 'line': 3 trials finished here")));
+}
+
+TEST_F(WorkRefuses, ACallWithoutAStore) {
+  EXPECT_THAT(torsio("work --help").out, HasSubstr("--store TEXT REQUIRED"));
+  EXPECT_EQ(torsio("work").exit_code, kCallWasWrong);
+}
+
+TEST_F(WorkRefuses, OptionsThatSpecimensDoNotUse) {
+  for (const std::string unused :
+       {"--folds 5", "--output m.safetensors", "--halving off", "--validation r.csv",
+        "--inputs spring_deflection_rad", "--target torque_Nm", "--allow-leak", "--rate 1kHz"}) {
+    const Outcome outcome = torsio(kSpecimens + (" " + unused));
+    EXPECT_EQ(outcome.exit_code, kCallWasWrong) << unused;
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr(unused.substr(0, unused.find(' '))),
+                                   HasSubstr("--specimens does not use this option")));
+  }
+  for (const char* several : {"linear,mlp", "search"})
+    EXPECT_THAT(
+        torsio("search --specimens 'dfki-50#0001..#0003' --models " + std::string(several)).err,
+        HasSubstr("--models: expected one model"));
+  EXPECT_EQ(torsio("search r.csv --duration 4s").exit_code, kCallWasWrong);
+}
+
+TEST_F(SearchStates, OneStructureInTheSingular) {
+  ASSERT_EQ(torsio("simulate dfki-50 sweep --duration 20s -o r.csv").exit_code, 0);
+  EXPECT_THAT(torsio("search r.csv --models linear").err,
+              HasSubstr("search: 1 structure, 3 folds, 3 trials to run"));
 }
 
 }  // namespace

@@ -24,6 +24,14 @@ TEST(SpecimenRange, IsAnActuatorWithTwoSerialNumbers) {
         << wrong;
 }
 
+TEST(SpecimenStudy, RefusesSeveralModels) {
+  for (const char* several : {"linear,mlp", "all", "search", ""})
+    EXPECT_THAT(test::error_message([&] { SpecimenStudy({.model = several}); }),
+                HasSubstr("--models: expected one model"))
+        << several;
+  EXPECT_NO_THROW(SpecimenStudy({.model = "mlp:layers=16-16:window=20"}));
+}
+
 std::vector<double> values_of(const SpecimenRequest& request, std::size_t threads) {
   SpecimenStudy kind(request);
   StudyStore store({});

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -136,7 +137,7 @@ std::string specimen_table(torsio::StudyStore& store, std::int64_t study) {
   });
   std::ranges::stable_sort(records, {},
                            [](const torsio::TrialRecord& record) { return record.result.value; });
-  std::string text = fmt::format("{} specimens\n", records.size());
+  std::string text = counted(records.size(), "specimen") + "\n";
   if (!records.empty()) {
     const auto line = [&](const char* what, std::size_t index) {
       text += fmt::format("  {:7}  {:<16}  RMSE {:.4g}\n", what, records[index].trial.device,
@@ -164,7 +165,21 @@ std::string specimen_json(torsio::StudyStore& store, std::int64_t study) {
   return document.dump(2) + "\n";
 }
 
-void run_specimens(SearchFlags& flags) {
+/// Refuses what a search over recordings has and simulated specimens do not use.
+void refuse_unused(const CLI::App& verb) {
+  constexpr auto kOfRecordings = std::to_array<const char*>(
+      {"--mapping", "--joint", "--rate", "--initialise", "--target", "--inputs", "--load",
+       "--validation", "--halving", "--folds", "--output", "--allow-leak"});
+  for (const char* option : kOfRecordings)
+    if (verb.count(option) > 0)
+      throw torsio::UsageError({.place = option,
+                                .problem = "--specimens does not use this option",
+                                .advice = "Leave it out: one model is fitted on a simulated "
+                                          "recording of each specimen, and none is written."});
+}
+
+void run_specimens(const CLI::App& verb, SearchFlags& flags) {
+  refuse_unused(verb);
   if (!flags.data.recordings.empty())
     throw torsio::UsageError({.place = "--specimens",
                               .expected = "no recordings: they are simulated",
@@ -172,7 +187,7 @@ void run_specimens(SearchFlags& flags) {
   torsio::SpecimenRequest request = torsio::specimen_range(flags.specimens);
   request.duration_s = torsio::signed_quantity_with_unit(flags.duration, "s", "--duration");
   request.seed = flags.seed;
-  if (flags.models != torsio::kSearch) request.model = flags.models;
+  if (verb.count("--models") > 0) request.model = flags.models;
   torsio::SpecimenStudy kind(request);
   torsio::StudyStore store(address_of(flags), wait_for_server);
   const torsio::StoredStudy study =
@@ -188,9 +203,9 @@ void run_specimens(SearchFlags& flags) {
   if (flags.json.wants_tables()) print(specimen_table(store, study.id));
 }
 
-void run(SearchFlags& flags) {
+void run(const CLI::App& verb, SearchFlags& flags) {
   check_call(flags);
-  if (!flags.specimens.empty()) return run_specimens(flags);
+  if (!flags.specimens.empty()) return run_specimens(verb, flags);
   flags.data.check_outputs({flags.output, flags.json.destination}, flags.validation);
   require_model_file(flags.output);
   const torsio::SearchRequest request = request_of(flags);
@@ -214,12 +229,12 @@ void run(SearchFlags& flags) {
                              kind.first_trials());
   take_back_of_dead(store, study);
   const torsio::StudyCounts counts = store.counts(study.id);
-  remark(fmt::format("search: {} structures, {} folds, {} trials to run{}{}", choices.size(),
-                     flags.folds, counts.waiting + counts.running,
-                     counts.finished > 0 ? fmt::format(", {} done before", counts.finished) : "",
-                     flags.worker.study.empty()
-                         ? ". Nothing is kept if it is stopped; --study NAME keeps it"
-                         : fmt::format(", kept in {}", store.address().name())));
+  remark(fmt::format(
+      "search: {}, {}, {} to run{}{}", counted(choices.size(), "structure"),
+      counted(flags.folds, "fold"), counted(counts.waiting + counts.running, "trial"),
+      counts.finished > 0 ? fmt::format(", {} done before", counts.finished) : "",
+      flags.worker.study.empty() ? ". Nothing is kept if it is stopped; --study NAME keeps it"
+                                 : fmt::format(", kept in {}", store.address().name())));
   if (!complete(flags, store, study, kind, progress.listener())) return;
   const torsio::StructureSearch search = kind.result(store, study.id);
   flags.json.write(torsio::cross_validation_json(search.scores));
@@ -249,11 +264,13 @@ void add_search(CLI::App& app) {
                        "load file: the target is the torque of this known load "
                        "(docs/use/known_load.md)");
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
-  verb->add_option("--specimens", flags->specimens,
-                   "in place of recordings: simulated specimens with their tolerances, a model of "
-                   "--models (default grey_box) fitted on each: dfki-50#0001..#1000");
+  CLI::Option* specimens = verb->add_option(
+      "--specimens", flags->specimens,
+      "in place of recordings: simulated specimens with their tolerances, the one model of "
+      "--models (default grey_box) fitted on each: dfki-50#0001..#1000");
   verb->add_option("--duration", flags->duration, "length of a recording of --specimens")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(specimens);
   verb->add_option("--models", flags->models,
                    "search: families with the orders, sizes and structures that people vary first; "
                    "or families with settings: linear,mlp:layers=8,mlp:layers=16-16")
@@ -282,5 +299,5 @@ void add_search(CLI::App& app) {
   verb->add_flag("--allow-leak", flags->allow_leak,
                  "accept an input that the target was computed from; the results are marked");
   flags->json.add(*verb, "the results");
-  verb->callback([flags] { run(*flags); });
+  verb->callback([flags, verb] { run(*verb, *flags); });
 }

@@ -33,6 +33,10 @@ torsio::WorkerOptions WorkerFlags::options() const {
   return {.threads = threads, .lease_s = lease_s};
 }
 
+std::string counted(std::size_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 bool wait_for_server(const std::string& reason) {
   static std::mutex guard;
   static bool is_lost = false;

@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 #include "torsio/search/workers.hpp"
 #include "torsio/store/study_store.hpp"
@@ -17,6 +18,9 @@ struct WorkerFlags {
   void add(CLI::App& verb, const char* store_help, const char* study_help);
   [[nodiscard]] torsio::WorkerOptions options() const;
 };
+
+/// "1 trial", "2 trials".
+[[nodiscard]] std::string counted(std::size_t count, std::string_view noun);
 
 /// Remarks once that the server is lost and once that it is back; false after Ctrl-C.
 [[nodiscard]] bool wait_for_server(const std::string& reason);

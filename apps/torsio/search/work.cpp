@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -89,7 +90,7 @@ struct Work {
         torsio::run_workers(store, study, *kind, options, progress);
     if (report.finished + report.lost == 0) return false;
     remark(fmt::format(
-        "study '{}': {} trials finished here{}", study.name, report.finished,
+        "study '{}': {} finished here{}", study.name, counted(report.finished, "trial"),
         report.lost > 0 ? fmt::format(", {} lost to other workers, since this one did not answer "
                                       "within the lease: their results were dropped",
                                       report.lost)
@@ -111,18 +112,38 @@ struct Work {
   }
 };
 
-void run(const WorkFlags& flags) {
-  if (flags.worker.store.empty())
-    throw torsio::UsageError(
-        {.place = "--store", .expected = "a SQLite file or a postgresql:// URL", .found = "none"});
-  torsio::WorkerOptions options = flags.worker.options();
-  options.until_complete = false;
-  const torsio::StoreAddress address = torsio::store_address(flags.worker.store);
-  if (address.kind == torsio::StoreAddress::Kind::sqlite && !flags.waits &&
-      !std::filesystem::exists(address.target))
+/// @throws torsio::Cancelled after Ctrl-C.
+void pause_2_s() {
+  for (int k = 0; k < 20; ++k) {
+    if (is_interrupted()) throw torsio::Cancelled();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+}
+
+/// Opening a SQLite file that does not exist would create it, at a misspelt path too.
+void require_store(const torsio::StoreAddress& address, bool waits) {
+  const auto is_there = [&] {
+    std::error_code absent;
+    return address.kind != torsio::StoreAddress::Kind::sqlite ||
+           std::filesystem::exists(address.target, absent);
+  };
+  if (is_there()) return;
+  if (!waits)
     throw torsio::Error({.place = address.name(),
                          .problem = "there is no such store",
                          .advice = "Correct the path, or begin a study with torsio search."});
+  remark(
+      fmt::format("{}: there is no such store yet; waiting until a study is begun there. "
+                  "Ctrl-C stops.",
+                  address.name()));
+  while (!is_there()) pause_2_s();
+}
+
+void run(const WorkFlags& flags) {
+  torsio::WorkerOptions options = flags.worker.options();
+  options.until_complete = false;
+  const torsio::StoreAddress address = torsio::store_address(flags.worker.store);
+  require_store(address, flags.waits);
   torsio::StudyStore store(address, wait_for_server,
                            flags.waits ? std::numeric_limits<double>::infinity()
                                        : torsio::kWorkerPatience * options.lease_s);
@@ -133,10 +154,7 @@ void run(const WorkFlags& flags) {
     for (const torsio::StoredStudy& study : work.studies()) has_worked |= work.work_on(study);
     if (has_worked) continue;
     if (!flags.waits) break;
-    for (int k = 0; k < 20; ++k) {
-      if (is_interrupted()) throw torsio::Cancelled();
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
+    pause_2_s();
   }
   remark(work.skipped.is_empty() ? "no trial is waiting"
                                  : "no trial is waiting of the studies that can be run here");
@@ -153,6 +171,8 @@ void add_work(CLI::App& app) {
       "Start as many as there are machines: docs/search.md.");
   flags->worker.add(*verb, "SQLite file or postgresql:// URL of the studies",
                     "only this study (default: all of the store)");
-  verb->add_flag("--wait", flags->waits, "wait for new trials instead of ending");
+  verb->get_option("--store")->required();
+  verb->add_flag("--wait", flags->waits,
+                 "wait for new trials, and for a store that is not there yet, instead of ending");
   verb->callback([flags] { run(*flags); });
 }
