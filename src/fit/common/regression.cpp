@@ -223,8 +223,8 @@ void note_on_rates(std::vector<std::string>& notes, const Design& design, const 
   names.reserve(rates.size());
   for (const std::size_t j : rates) names.push_back(data.inputs[j].expression);
   notes.push_back(fmt::format(
-      "warning: {0} has no slope over rates ({1}); with them, the RMSE of the training would be at "
-      "most {2:.4g} instead of {3:.4g} {4}: --set rates=true, in --models {0}:rates=true",
+      "warning: {0} has no slope over rates ({1}); with them, the RMSE of the training would be "
+      "about {2:.4g} instead of {3:.4g} {4}: --set rates=true, in --models {0}:rates=true",
       family, fmt::join(names, ", "), std::sqrt(with / count), std::sqrt(without / count),
       unit_label(data.target)));
 }
