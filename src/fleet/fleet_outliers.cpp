@@ -12,7 +12,9 @@ namespace torsio {
 namespace {
 
 OutlierOptions options_for(JointTrait trait) {
-  OutlierOptions options{.sides = is_size(trait) ? OutlierSides::upper : OutlierSides::both};
+  // A joint with less play than the base has is sound.
+  const bool is_upper = is_size(trait) || trait == JointTrait::backlash;
+  OutlierOptions options{.sides = is_upper ? OutlierSides::upper : OutlierSides::both};
   // What a remounted load cell may show, docs/robot/drift.md.
   constexpr double kScaleTolerance = 0.012;
   constexpr double kFrictionTolerance = 0.04;
