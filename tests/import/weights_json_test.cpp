@@ -123,7 +123,10 @@ TEST(WeightsJson, TakesTimeInProportionToTheNumberOfTensors) {
   // Proportional: a factor of 16 and that of the maps' logarithm. Quadratic: 256.
   double least = seconds_of(1000);
   for (int k = 0; k < 4; ++k) least = std::min(least, seconds_of(1000));
-  EXPECT_LT(seconds_of(16000), 80.0 * least);
+  // Other programs may interrupt a run.
+  double many = seconds_of(16000);
+  for (int k = 0; k < 2; ++k) many = std::min(many, seconds_of(16000));
+  EXPECT_LT(many, 80.0 * least);
 }
 
 TEST(WeightsJson, RefusesTwoOutputsAndWeightsBeyondFloat) {
