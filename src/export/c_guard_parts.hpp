@@ -42,6 +42,8 @@ class CGuardParts {
     return false;
   }
 
+  [[nodiscard]] bool has_strokes() const { return list_.longest_stroke > 0.0; }
+
   CText& c_;
   const GuardListing& list_;
   const EstimatorSettings& settings_;
@@ -52,6 +54,9 @@ class CGuardParts {
 /// Writes the functions around what the memory of the model has missed, of `detail::MemoryError`.
 /// @returns whether `NAME_miss_others` is among them
 bool write_memory_error(CText& c, const CGuards& guards);
+
+/// Writes the functions that follow the strokes of the first input, for guards that have them.
+void write_strokes(CText& c, const CGuards& guards);
 
 /// Writes the functions that detect jumps of the raw inputs, if it can be known what a jump is.
 void write_jumps(CText& c, const CGuards& guards);

@@ -55,7 +55,7 @@ class GuardWriter : private CGuardParts {
     write_evidence();
     if (list_.has_memory) has_missed_others_ = write_memory_error(c_, guards_);
     write_jumps(c_, guards_);
-    if (has_strokes()) write_strokes();
+    if (has_strokes()) write_strokes(c_, guards_);
     write_excursion();
     write_output();
     write_tick();
@@ -97,50 +97,6 @@ static @real @model_std_dev(const @estimate *raw) {
             {"LAST", counted(std_dev.size() - 1)},
             {"EDGES", c_.table("residual_edges", table.edges)},
             {"STD_DEV", c_.table("residual_std_dev", std_dev)}});
-  }
-
-  // Strokes that are longer than those of the training: `detail::StrokeClock`.
-
-  [[nodiscard]] bool has_strokes() const { return list_.longest_stroke > 0.0; }
-
-  void write_strokes() {
-    for (const char* const each :
-         {"uint32_t stroke_ticks", "uint32_t previous_stroke", "uint32_t since_extreme",
-          "@real extreme", "int stroke_direction"})
-      c_.member(each);
-    c_.add(R"c(
-static void @follow_stroke(@state *s, @real x) {
-  @real moved;
-  if (s->stroke_ticks == 0U) s->extreme = x;
-  if (s->stroke_ticks < @MAX_MISSED) ++s->stroke_ticks;
-  if (s->since_extreme < @MAX_MISSED) ++s->since_extreme;
-  moved = x - s->extreme;
-  if (s->stroke_direction == 0) {
-    if (!(@absolute(moved) > $DEAD_BAND$)) return;
-    s->stroke_direction = moved > (@real)0 ? 1 : -1;
-  } else if (moved * (@real)s->stroke_direction < (@real)0) {
-    if (!(@absolute(moved) > $DEAD_BAND$)) return;
-    s->previous_stroke = s->stroke_ticks - s->since_extreme;
-    s->stroke_ticks = s->since_extreme;
-    s->stroke_direction = -s->stroke_direction;
-  }
-  s->extreme = x;
-  s->since_extreme = 0U;
-}
-/* What a stroke that lasts longer than those of the training adds to the error bar. */
-static @real @stroke_std_dev(const @state *s) {
-  const uint32_t ticks =
-      s->stroke_ticks > s->previous_stroke ? s->stroke_ticks : s->previous_stroke;
-  const @real share = (@real)ticks * $PER_LONGEST$;
-  const @real beyond = share - (@real)1;
-  if (!(beyond > (@real)0)) return (@real)0;
-  return @smaller(beyond * beyond / share * $GROWTH$, $LIMIT$);
-}
-)c",
-           {{"DEAD_BAND", number(settings_.strokes.dead_band)},
-            {"PER_LONGEST", number(1.0 / list_.longest_stroke)},
-            {"GROWTH", number(settings_.strokes.growth)},
-            {"LIMIT", number(settings_.strokes.limit)}});
   }
 
   // Features beyond their ranges.
