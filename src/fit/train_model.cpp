@@ -135,8 +135,7 @@ std::size_t recordings_of(const Dataset& dataset) {
 HeldOutErrors evidence_of(const FittedModel& fitted, const HeldOutErrors& held_out,
                           const TrainingData& training, std::size_t recordings,
                           std::size_t reversals) {
-  constexpr std::size_t kSeveral = 3;
-  const bool has_better = reversals < kFewReversals || fitted.held_out_records >= kSeveral;
+  const bool has_better = reversals < kFewReversals || fitted.held_out_records >= kSeveralRecords;
   HeldOutErrors evidence{.rmse = has_better && std::isfinite(fitted.held_out_rmse)
                                      ? fitted.held_out_rmse
                                      : std::fmax(fitted.held_out_rmse, held_out.rmse),

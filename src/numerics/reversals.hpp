@@ -13,11 +13,13 @@ namespace torsio {
 /// Fewer reversals show neither hysteresis nor how well a model repeats.
 inline constexpr std::size_t kFewReversals = 3;
 
+/// Share of the range by which a value has to turn back for a reversal. With 2 % noise cuts slow strokes into short ones.
+inline constexpr double kReversalShare = 0.05;
+
 /// The number of reversals by more than 5 % of the range, counted up to `most`. Values that are not finite are passed
 /// over.
 [[nodiscard]] inline std::size_t count_reversals(
     std::span<const double> values, std::size_t most = std::numeric_limits<std::size_t>::max()) {
-  constexpr double kReversalShare = 0.05;
   double lowest = std::numeric_limits<double>::infinity();
   double highest = -lowest;
   for (const double value : values) {

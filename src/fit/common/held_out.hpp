@@ -24,6 +24,9 @@ struct HeldOutErrors {
   double least_std_dev = 0.0;
 };
 
+/// The error of so many recordings that were held out in turn is better evidence than that of parts of recordings.
+inline constexpr std::size_t kSeveralRecords = 3;
+
 /// How often the first input reverses, counted up to `kFewReversals`.
 [[nodiscard]] std::size_t reversals_of(const TrainingData& data);
 

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <utility>
 
+#include "fit/common/guards.hpp"
 #include "numerics/quantile.hpp"
+#include "numerics/reversals.hpp"
 #include "torsio/estimate/estimator_core.hpp"
 
 namespace torsio {
@@ -48,15 +49,8 @@ void for_each_place(const TrainingData& data, const Visit& visit) {
 }  // namespace
 
 double stroke_dead_band(const TrainingData& data) {
-  double lowest = std::numeric_limits<double>::infinity();
-  double highest = -lowest;
-  for_each_place(data, [&](std::size_t s, std::size_t n) {
-    lowest = std::min(lowest, data.sequences[s].features(n, 0));
-    highest = std::max(highest, data.sequences[s].features(n, 0));
-  });
-  constexpr double kShare =
-      0.05;  // as in `count_reversals`; with 2 % noise cut slow strokes into short ones
-  return kShare * std::max(highest - lowest, 0.0);
+  const FeatureRanges ranges = feature_ranges(data);
+  return kReversalShare * std::max(ranges.highest[0] - ranges.lowest[0], 0.0);
 }
 
 double longest_stroke_s(const TrainingData& data) {

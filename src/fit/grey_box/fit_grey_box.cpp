@@ -17,6 +17,7 @@
 
 #include "core/report_progress.hpp"
 #include "fit/common/folds.hpp"
+#include "fit/common/held_out.hpp"
 #include "fit/common/model_run.hpp"
 #include "fit/grey_box/grey_box_search.hpp"
 #include "fit/grey_box/late_target.hpp"
@@ -224,13 +225,12 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
       residual_of(*model, left.samples, options.bound * rms_of(left.samples, nullptr));
 }
 
-/// A box, the terms that it was fitted for, and its errors on what differs most from the rest of the data; 0: not
-/// determined.
+/// A box, the terms that it was fitted for, and the error where a contiguous fifth of a single recording is held out; 0:
+/// none was.
 struct ChosenBox {
   FittedGreyBox fitted;
   GreyBoxChoice choice = {};
-  double spans_rmse = 0.0;  ///< a contiguous fifth of a single recording
-  StrokeErrors strokes = {};
+  double spans_rmse = 0.0;
 };
 
 /// Takes the terms of a search, with a note.
@@ -332,13 +332,11 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
     box.spans_rmse = GreyBoxCandidate(spans, chosen.choice).held_out().rmse;
   }
   fitted.held_out_records = search.held_out_records();
-  if (!fitted.parameters.coefficients.scheduled)
-    box.strokes = stroke_errors(data, fitted.parameters, box.choice, fitted.held_out_rmse);
   return box;
 }
 
 /// Error bars as wide as the error on the most different part of the data.
-void widen(ChosenBox& box) {
+void widen(ChosenBox& box, const StrokeErrors& strokes) {
   const auto to = [&](double rmse, const char* of) {
     if (!(rmse > box.fitted.held_out_rmse)) return;
     box.fitted.held_out_rmse = rmse;
@@ -347,9 +345,8 @@ void widen(ChosenBox& box) {
   };
   to(box.spans_rmse, "contiguous fifths");
   // Whole recordings that were held out already contain strokes of all durations.
-  constexpr std::size_t kSeveral = 3;
-  if (box.fitted.held_out_records < kSeveral) to(box.strokes.rmse, "strokes of other durations");
-  box.fitted.stroke_growth = box.strokes.growth;
+  if (box.fitted.held_out_records < kSeveralRecords) to(strokes.rmse, "strokes of other durations");
+  box.fitted.stroke_growth = strokes.growth;
 }
 
 }  // namespace
@@ -373,12 +370,15 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
   const bool may_learn = options.residual != ResidualKind::none && !options.passive;
   FittedGreyBox& fitted = box.fitted;
   const double without = fitted.held_out_rmse;
+  StrokeErrors strokes;
+  if (!fitted.parameters.coefficients.scheduled)
+    strokes = stroke_errors(data, fitted.parameters, box.choice, without);
   if (may_learn) learn_residual(fitted, data, options, context);
   // What a network adds is as good there as elsewhere.
   const double gain = fitted.held_out_rmse / without;
   box.spans_rmse *= gain;
-  box.strokes.rmse *= gain;
-  widen(box);
+  strokes.rmse *= gain;
+  widen(box, strokes);
   return std::move(box.fitted);
 }
 
