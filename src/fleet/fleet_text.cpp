@@ -121,13 +121,14 @@ std::string difference_text(const FleetCalibration& fleet) {
     (type.is_compared() ? compared : alone) += type.members.size();
   if (compared + alone == 0) return {};
   if (compared == 0)
-    return fmt::format("; not compared with each other ({}, 8 of a type are needed)",
-                       plural(alone, "joint"));
+    return fmt::format("; not compared with each other ({}, {} of a type are needed)",
+                       plural(alone, "joint"), kLeastMembers);
   std::string text =
       fleet.outliers.size() == 1
           ? "; 1 differs from the others of its type"
           : fmt::format("; {} differ from the others of their type", fleet.outliers.size());
-  if (alone > 0) text += fmt::format(", {} not compared (8 of a type are needed)", alone);
+  if (alone > 0)
+    text += fmt::format(", {} not compared ({} of a type are needed)", alone, kLeastMembers);
   return text;
 }
 
@@ -183,8 +184,8 @@ std::string planted_text(const FleetCalibration& fleet) {
           ? fmt::format(
                 "planted faults: {} of {} found, {} of them with the right kind; {} listed\n",
                 faults.found, faults.planted, faults.right, plural(faults.sound, "sound joint"))
-          : fmt::format("planted faults: 0 of {} found: fewer than 8 joints cannot be compared\n",
-                        faults.planted);
+          : fmt::format("planted faults: 0 of {} found: fewer than {} joints cannot be compared\n",
+                        faults.planted, kLeastMembers);
   for (std::size_t i = 0; i < fleet.joints.size(); ++i)
     if (!fleet.joints[i].fault.empty() &&
         std::ranges::find(fleet.outliers, i, &FleetOutlier::joint) == fleet.outliers.end())
@@ -207,7 +208,7 @@ std::string tails_text(const FleetCalibration::OfType& type) {
   return type.is_compared()
              ? "limits: fewer than 100 joints do not show their tails; a normal distribution "
                "is assumed"
-             : "no limits: fewer than 8 joints cannot be compared";
+             : fmt::format("no limits: fewer than {} joints cannot be compared", kLeastMembers);
 }
 
 FleetTextJson joint_json(const CalibratedJoint& joint) {

@@ -13,7 +13,6 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kLeastMembers = 8;
 constexpr std::size_t kMembersOfTail = 100;
 constexpr double kTailFrom = 0.75;
 constexpr double kTailUpTo = 0.985;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,6 +11,9 @@ namespace torsio {
 
 /// Which members of a population may be outliers.
 enum class OutlierSides : std::uint8_t { both, upper };
+
+/// In a smaller population no member is an outlier.
+inline constexpr std::size_t kLeastMembers = 8;
 
 /// One member of a population.
 struct OutlierScore {

@@ -90,8 +90,8 @@ void register_joints(const CalibrateFlags& flags, torsio::StudyStore& store,
   for (const std::string& refused : added.refused) remark("not made current: " + refused);
   if (!added.not_compared.empty())
     remark(fmt::format(
-        "made current without a comparison with other joints, of which 8 of a type are needed: {}",
-        fmt::join(added.not_compared, ", ")));
+        "made current without a comparison with other joints, of which {} of a type are needed: {}",
+        torsio::kLeastMembers, fmt::join(added.not_compared, ", ")));
 }
 
 /// After all results are written: the exit code is that of `fleet watch`.
