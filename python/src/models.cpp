@@ -71,6 +71,15 @@ void bind_models(py::module_& module) {
       .def_property_readonly("zeroed_channels",
                              [](const Model& self) { return self.file->settings.zeroed_channels; })
       .def_property_readonly(
+          "target_uncertainty",
+          [](const Model& self) {
+            const SensorUncertainty& sensor = self.file->settings.target_uncertainty;
+            return py::make_tuple(sensor.constant, sensor.relative);
+          },
+          "(constant, relative): standard uncertainty of the sensor that the model was learned "
+          "from, as a mapping\n"
+          "stated it; part of every error bar.")
+      .def_property_readonly(
           "parameter_count",
           [](const Model& self) { return AnyModel(self.file->parameters).parameter_count(); })
       .def_property_readonly("serial",

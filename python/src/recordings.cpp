@@ -241,14 +241,17 @@ py::tuple pickled(const py::object& self) {
   py::list zeros;
   for (const ZeroRule& each : recording.zeros)
     zeros.append(py::make_tuple(each.channel, each.first_s, each.mid_range));
+  py::list uncertainties;
+  for (const auto& [channel, sensor] : recording.uncertainties)
+    uncertainties.append(py::make_tuple(channel, sensor.constant, sensor.relative));
   return py::make_tuple(kPickleVersion, recording.name(), recording.sample_rate_Hz(),
                         recording.time_s(0), channels, recording.conditions(), definitions, zeros,
                         recording.mapping, recording.source.file, recording.source.sha256,
-                        recording.labels);
+                        recording.labels, uncertainties);
 }
 
 Recording recording_unpickled(const py::tuple& state) {
-  check_pickle(state, 12, "Recording");
+  check_pickle(state, 13, "Recording");
   Recording recording(state[1].cast<std::string>(), state[2].cast<double>(),
                       state[3].cast<double>());
   const auto conditions = state[5].cast<std::vector<std::string>>();
@@ -283,6 +286,10 @@ Recording recording_unpickled(const py::tuple& state) {
   recording.mapping = state[8].cast<std::string>();
   recording.source = {state[9].cast<std::string>(), state[10].cast<std::string>()};
   recording.labels = state[11].cast<std::vector<std::pair<std::string, std::string>>>();
+  for (const py::handle& each : state[12]) {
+    const auto part = each.cast<std::tuple<std::string, double, double>>();
+    recording.uncertainties[std::get<0>(part)] = {std::get<1>(part), std::get<2>(part)};
+  }
   return recording;
 }
 

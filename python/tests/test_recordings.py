@@ -122,6 +122,23 @@ def test_a_recording_can_be_pickled(sweep):
     np.testing.assert_array_equal(again.time_s, sweep.time_s)
 
 
+def test_the_uncertainty_of_the_torque_is_part_of_the_error_bars(tmp_path, sweep):
+    sweep.write_csv(tmp_path / "sweep.csv")
+    (tmp_path / "cell.yaml").write_text("uncertainty: {torque_Nm: {gain: 1%, zero: 0.5Nm}}")
+    stated = torsio.read(tmp_path / "sweep.csv", mapping=tmp_path / "cell.yaml")[0]
+    plain = torsio.fit(sweep, "linear")
+    assert plain.target_uncertainty == (0.0, 0.0)
+    for recording in (stated, pickle.loads(pickle.dumps(stated))):
+        model = torsio.fit(recording, "linear")
+        assert model.target_uncertainty == (0.5, 0.01)
+        found, without = torsio.estimate(model, sweep), torsio.estimate(plain, sweep)
+        np.testing.assert_allclose(
+            found.std_dev, np.sqrt(without.std_dev**2 + 0.5**2 + (0.01 * without.value) ** 2), rtol=1e-9
+        )
+    scores = [torsio.evaluate(each, sweep).together()[0] for each in (model, plain)]
+    assert scores[0].mean_std_dev == pytest.approx(scores[1].mean_std_dev)
+
+
 def test_a_log_of_bam_has_labels(tmp_path):
     entries = [{"timestamp": 0.01 * n, "position": 0.1 * n} for n in range(20)]
     log = {"mass": 0.5, "length": 0.1, "kp": 8, "vin": 12, "motor": "m", "trajectory": "t", "entries": entries}

@@ -96,8 +96,8 @@ void derive_target(Recording& recording, const std::string& target) {
   }
 }
 
-/// A source need not be recorded, but one that is must not be missed because of its spelling.
-void check_computed_from(const Mapping& mapping, const Recording& recording) {
+/// A channel of these keys need not be recorded, but one that is must not be missed because of its spelling.
+void check_spelling(const Mapping& mapping, const Recording& recording) {
   const std::vector<std::string> names = channel_names(recording.channels());
   const auto check = [&](const std::string& name, const std::string& key) {
     const std::string advice = recording.has(name) ? "" : did_you_mean(name, names);
@@ -111,6 +111,7 @@ void check_computed_from(const Mapping& mapping, const Recording& recording) {
     check(target, "computed_from");
     for (const std::string& source : sources) check(source, "computed_from." + target);
   }
+  for (const UncertaintyRule& rule : mapping.uncertainty) check(rule.channel, "uncertainty");
 }
 
 /// The columns that the mapping names.
@@ -164,7 +165,7 @@ std::vector<Recording> load(const Log& log, const std::string& target,
     add_derived(recording, mapping.derive);
     if (needed.empty()) {
       derive_target(recording, target);
-      check_computed_from(mapping, recording);
+      check_spelling(mapping, recording);
     }
     recording.source.file = log.entry.file;
     recording.mapping = text;

@@ -83,6 +83,7 @@ Recording resample(const Recording& recording, double sample_rate_Hz) {
   result.source = recording.source;
   result.definitions = recording.definitions;
   result.zeros = recording.zeros;
+  result.uncertainties = recording.uncertainties;
   result.columns = recording.columns;
   result.labels = recording.labels;
   if (recording.size() == 0) return result;

@@ -86,6 +86,14 @@ void check_strokes(const StrokeGuard& strokes) {
                       fmt::format("{}", value));
 }
 
+void check_target_uncertainty(const SensorUncertainty& sensor) {
+  for (const auto& [name, value] :
+       {std::pair{"constant", sensor.constant}, {"relative", sensor.relative}})
+    if (!std::isfinite(value) || value < 0.0)
+      refuse_settings(fmt::format("target_uncertainty.{}", name), "a finite number, at least 0",
+                      fmt::format("{}", value));
+}
+
 }  // namespace
 
 void check_settings(const EstimatorSettings& settings, std::size_t model_input_count) {
@@ -100,6 +108,7 @@ void check_settings(const EstimatorSettings& settings, std::size_t model_input_c
   check_fallback(settings.fallback, inputs.size());
   check_residuals(settings.residuals);
   check_strokes(settings.strokes);
+  check_target_uncertainty(settings.target_uncertainty);
 }
 
 void check_disturbances(const DisturbanceGuards& guards, std::size_t raw_inputs) {

@@ -54,6 +54,7 @@ std::uint64_t identity_of(const EstimatorSettings& settings) noexcept {
   hash.add_value(settings.strokes);
   hash.add_value(settings.fallback);
   hash.add_value(settings.residuals);
+  hash.add_value(settings.target_uncertainty);
   return hash.value();
 }
 
@@ -255,6 +256,8 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
     if (!excursion.is_outside() && !is_wrong_rate_)
       out.std_dev = evidence(settings_.fallback.residual_std);
   }
+  if (settings_.target_uncertainty.is_stated())
+    out.std_dev = std::hypot(out.std_dev, settings_.target_uncertainty.at(out.value));
   out.novelty = has_strokes() && std::isnan(raw_estimate.novelty) ? novelty : raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
     // With an unknown zero, the range of a channel cannot be checked. A warm-up ends by itself, the want of a

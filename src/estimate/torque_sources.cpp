@@ -27,6 +27,15 @@ void check_target(const EstimatorSettings& settings) {
                .found = fmt::format("'{}'", settings.target)});
 }
 
+/// Sources that were learned from one sensor have its error in common: their differences do not contain it. Zeros
+/// are set afterwards.
+Estimator without_target_uncertainty(Estimator estimator) {
+  if (!estimator.settings().target_uncertainty.is_stated()) return estimator;
+  EstimatorSettings settings = estimator.settings();
+  settings.target_uncertainty = {};
+  return {std::move(settings), estimator.model()};
+}
+
 }  // namespace
 
 FrictionFilter::FrictionFilter(const Settings& settings, double sample_rate_Hz)
@@ -74,6 +83,7 @@ Estimate TorqueSources::Fed::step(std::span<const double> raw) noexcept {
 
 TorqueSources::Fed TorqueSources::fed(Estimator estimator) {
   check_target(estimator.settings());
+  estimator = without_target_uncertainty(std::move(estimator));
   const double rate_Hz = estimator.settings().sample_rate_Hz;
   if (sample_rate_Hz_ == 0.0) sample_rate_Hz_ = rate_Hz;
   if (rate_Hz != sample_rate_Hz_)

@@ -229,6 +229,8 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
     widen_to(residuals, after.together.metrics.rmse);
     adapted.file.settings.residuals = larger_of(model.settings.residuals, residuals);
   }
+  SensorUncertainty& uncertainty = adapted.file.settings.target_uncertainty;
+  uncertainty = larger_of(uncertainty, training_uncertainty(dataset));
   note_held_out_scores(adapted.file.card, {{.family = {}, .score = after.together}});
   return adapted;
 }

@@ -20,16 +20,15 @@ struct Coverage {
   std::size_t within_2 = 0;
   double sum = 0.0;
 
-  void add(const Estimate& estimate, double target) {
-    if (!std::isfinite(estimate.std_dev)) {
+  void add(double error, double std_dev) {
+    if (!std::isfinite(std_dev)) {
       ++without;
       return;
     }
-    sum += estimate.std_dev;
-    const double error = std::abs(estimate.value - target);
+    sum += std_dev;
     ++samples;
-    if (error <= estimate.std_dev) ++within;
-    if (error <= 2.0 * estimate.std_dev) ++within_2;
+    if (std::abs(error) <= std_dev) ++within;
+    if (std::abs(error) <= 2.0 * std_dev) ++within_2;
   }
   [[nodiscard]] double share(std::size_t count) const {
     return samples == 0 ? kNotMeasured : static_cast<double>(count) / static_cast<double>(samples);
@@ -78,7 +77,7 @@ struct Tally {
       if (estimate.fault == Fault::diverged || estimate.fault == Fault::model_not_finite)
         ++diverged;
       metrics.add(estimate.value, target.values[i]);
-      coverage.add(estimate, target.values[i]);
+      coverage.add(estimate.value - target.values[i], run.compared_std_dev(i));
     }
     if (run.one_step) add_one_step(*run.one_step, target, segment);
   }

@@ -107,13 +107,21 @@ Prediction predict(Estimator estimator, const Recording& recording,
   return prediction;
 }
 
+SensorUncertainty common_uncertainty(const EstimatorSettings& settings, const std::string& target) {
+  return target == settings.target ? settings.target_uncertainty : SensorUncertainty{};
+}
+
 ScoredRun scored_run(const Estimator& estimator, const Dataset& dataset,
                      const DatasetRecord& record) {
   const Channel& target = record.recording.channel(dataset.target);
+  // The torque of a known load has no error of the sensor.
+  const bool is_same_sensor = !dataset.load_target.is_used();
   ScoredRun run{
       .record = &record,
       .target = &target,
-      .prediction = predict(estimator, record.recording, {&target, dataset.initialise_samples})};
+      .prediction = predict(estimator, record.recording, {&target, dataset.initialise_samples}),
+      .common = is_same_sensor ? common_uncertainty(estimator.settings(), dataset.target)
+                               : SensorUncertainty{}};
   if (estimator.model().feeds_back())
     run.one_step = predict(estimator, record.recording, {&target, record.recording.size()});
   return run;

@@ -153,6 +153,18 @@ $BODY$}
     return sum;
   }
 
+  /// The term of `SensorUncertainty` in the error bar.
+  [[nodiscard]] std::string sensor_term() const {
+    const SensorUncertainty& sensor = settings_.target_uncertainty;
+    std::string text;
+    const auto add = [&](const std::string& term) {
+      text += fmt::format("  out.std_dev = @hypotenuse(out.std_dev, {});\n", term);
+    };
+    if (sensor.constant > 0.0) add(number(sensor.constant));
+    if (sensor.relative > 0.0) add(number(sensor.relative) + " * out.value");
+    return text;
+  }
+
   void write_output() {
     const double residual = settings_.fallback.residual_std;
     const bool has_residual = std::isfinite(residual) && residual > 0.0;
@@ -231,7 +243,7 @@ $WIDEN$    if (is_outside) out.fault = @OUTSIDE_TRAINING_RANGE;
     out.value = @fallback(s, f);
     out.std_dev = !is_outside && !s->is_wrong_rate ? $FALLBACK_STD$ : @not_a_number();
   }
-$ZEROS$  s->last_value = out.value;
+$SENSOR$$ZEROS$  s->last_value = out.value;
   return out;
 }
 )c",
@@ -250,6 +262,7 @@ $ZEROS$  s->last_value = out.value;
             {"FALLBACK_STD", fallback_std},
             {"STROKE", has_strokes() ? "  @real stroke;\n" : ""},
             {"WIDEN", widen},
+            {"SENSOR", sensor_term()},
             {"ZEROS", zeros}});
   }
 

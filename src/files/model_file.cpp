@@ -107,6 +107,9 @@ ModelFile read_model(std::span<const std::byte> bytes, std::string_view place,
     take_leaves(contents, "guards.strokes", place, model.settings.strokes, may_be_nan);
   take_leaves(contents, "fallback", place, model.settings.fallback, may_be_nan);
   take_leaves(contents, "residuals", place, model.settings.residuals, may_be_nan);
+  if (has_tensors_of(contents, "target_uncertainty"))
+    take_leaves(contents, "target_uncertainty", place, model.settings.target_uncertainty,
+                may_be_nan);
   check_nothing_left(contents, place, model.parameters.family());
   return model;
 }
@@ -125,6 +128,8 @@ std::vector<std::byte> model_bytes(const ModelFile& model) {
     put_leaves(contents, "guards.strokes", model.settings.strokes);
   put_leaves(contents, "fallback", model.settings.fallback);
   put_leaves(contents, "residuals", model.settings.residuals);
+  if (model.settings.target_uncertainty.is_stated())
+    put_leaves(contents, "target_uncertainty", model.settings.target_uncertainty);
   return safetensors_bytes(contents);
 }
 

@@ -165,6 +165,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   card.mapping = training_mapping(dataset, notes);
   if (dataset.load_target.is_used())
     std::ranges::move(load_target_notes(dataset.load_target), std::back_inserter(notes));
+  if (std::string note = uncertainty_note(dataset); !note.empty()) notes.push_back(std::move(note));
   note_left_out(data.training, notes);
   if (data.validation) note_left_out(*data.validation, notes);
   const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
@@ -196,6 +197,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   EstimatorSettings settings = guarded_settings(
       choice.features, data.training, fitted.model, data.validation ? &*data.validation : nullptr,
       evidence_of(fitted, held_out, data.training, recordings_of(dataset), reversals));
+  settings.target_uncertainty = training_uncertainty(dataset);
   const bool has_memory =
       !fitted.model.memory({settings.ranges.lowest, settings.ranges.highest}).is_empty();
   if (family.is_spring && has_memory && !held_out.has_return)

@@ -201,6 +201,19 @@ std::string load_lines(const ModelCard& card) {
   return fmt::format("{}\n", fmt::join(load_target_notes(card.load_target), "\n"));
 }
 
+std::string sensor_line(const EstimatorSettings& settings) {
+  const std::string text = uncertainty_text(settings.target_uncertainty, settings.target);
+  if (text.empty()) return {};
+  return fmt::format(
+      "reference sensor: {}, as stated with the recordings; part of the error bars\n", text);
+}
+
+nlohmann::ordered_json sensor_json(const EstimatorSettings& settings) {
+  const SensorUncertainty& sensor = settings.target_uncertainty;
+  if (!sensor.is_stated()) return nullptr;
+  return {{"constant", sensor.constant}, {"relative", sensor.relative}};
+}
+
 std::string cycle_text(const SlowCycle& cycle) {
   if (!cycle.reason.empty())
     return fmt::format("stiffness, loop width and friction cannot be determined: {}\n",
@@ -299,6 +312,7 @@ std::string model_description(const ModelFile& model, const SlowCycle& cycle) {
   text += score_line(model);
   text += zero_line(settings);
   text += load_lines(model.card);
+  text += sensor_line(settings);
   text += mapping_lines(model.card);
   text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
@@ -317,6 +331,7 @@ std::string model_description_json(const ModelFile& model, const SlowCycle& cycl
       {"mapping", text_or_null(model.card.mapping)},
       {"load", model.card.load_target.is_used() ? load_target_json(model.card.load_target)
                                                 : DescriptionJson()},
+      {"target_uncertainty", sensor_json(model.settings)},
       {"options", model.card.options},
       {"held_out", model.card.held_out},
       {"metrics", model.card.metrics},

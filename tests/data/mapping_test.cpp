@@ -1,6 +1,7 @@
 #include "torsio/data/mapping.hpp"
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -124,6 +125,7 @@ zero:
   - {channel: gear_angle_rad, mid_range: true}
 hold: [torque_Nm]
 latency: {torque_Nm: 2ms}
+uncertainty: {torque_Nm: {class: 0.3%, range: 57000mNm, gain: 0.57%, mounting: 0.3%, zero: 0.1Nm}}
 derive: {spring_deflection_rad: "gear_angle_rad - joint_angle_rad"}
 computed_from: {torque_Nm: [iq_A]}
 )";
@@ -152,6 +154,8 @@ computed_from: {torque_Nm: [iq_A]}
   EXPECT_EQ(again.zero, mapping.zero);
   EXPECT_EQ(again.hold, mapping.hold);
   EXPECT_EQ(again.latency.at(0).latency_s, 0.002);
+  ASSERT_EQ(again.uncertainty.size(), 1U);
+  EXPECT_EQ(again.uncertainty.at(0).combined(), mapping.uncertainty.at(0).combined());
   EXPECT_EQ(again.derive, mapping.derive);
   EXPECT_EQ(again.computed_from, mapping.computed_from);
   EXPECT_EQ(mapping_text(Mapping{}), "");
@@ -615,6 +619,54 @@ TEST(Mapping, CompensatesALatencyByWholeSamples) {
   EXPECT_EQ(values[0], 3.0);
   EXPECT_EQ(values[1], 4.0);
   EXPECT_TRUE(std::isnan(values[2]));
+}
+
+TEST(Mapping, StatesTheUncertaintyOfASensor) {
+  const Recording recording =
+      read("t_s,torque_Nm\n0,1\n0.01,2\n",
+           "uncertainty: {torque_mNm: {class: 0.2%, range: 100Nm, gain: 0.3%, mounting: 0.4 %, "
+           "zero: 50mNm}}")[0];
+  const SensorUncertainty& sensor = recording.uncertainties.at("torque_Nm");
+  // A limit of 0.2 Nm, all values within it equally likely.
+  EXPECT_DOUBLE_EQ(sensor.constant, std::hypot(0.2 / std::numbers::sqrt3, 0.05));
+  EXPECT_DOUBLE_EQ(sensor.relative, 0.005);
+  EXPECT_EQ(
+      read("t_s,a_m\n0,1\n1,2\n", "uncertainty: {a_m: {gain: 1%}}")[0].uncertainties.at("a_m"),
+      (SensorUncertainty{.constant = 0.0, .relative = 0.01}));
+  EXPECT_EQ(recording.part(0, 1).uncertainties.size(), 1U);
+}
+
+TEST(Mapping, RefusesUncertaintiesThatMeanNothing) {
+  const auto message = [](const std::string& entries) {
+    return test::error_message(
+        [&] { (void)parse_mapping("uncertainty: {torque_Nm: {" + entries + "}}", "m.yaml"); });
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(message("class: 0.2%"), HasSubstr("the range of the sensor beside it"));
+  EXPECT_THAT(message("class: 0.2%"), HasSubstr("class: 0.2%, range: 100Nm"));
+  EXPECT_THAT(message("range: 100Nm, gain: 1%"), HasSubstr("class: beside range:"));
+  EXPECT_THAT(message("class: 0.2, range: 100Nm"), HasSubstr("Write 0.2%"));
+  EXPECT_THAT(message("class: CLASS, range: RANGE"), HasSubstr("found 'CLASS'"));
+  EXPECT_THAT(message("class: CLASS, range: RANGE"), testing::Not(HasSubstr("CLASS%")));
+  EXPECT_THAT(message("gain: 0.5Nm"), HasSubstr("a share of the reading in %"));
+  EXPECT_THAT(message("gain: -1%"), HasSubstr("from 0% to below 100%"));
+  EXPECT_THAT(message("gain: 100%"), HasSubstr("from 0% to below 100%"));
+  EXPECT_THAT(message("gain: nan%"), HasSubstr("m.yaml: line 1 (uncertainty.torque_Nm.gain)"));
+  EXPECT_THAT(message("zero: 0.1"), HasSubstr("Write 0.1Nm"));
+  EXPECT_THAT(message("zero: 0.1N"), HasSubstr("uncertainty.torque_Nm.zero"));
+  EXPECT_THAT(message("zero: -0.1Nm"), HasSubstr("not negative"));
+  EXPECT_THAT(message("zero: 1e300Nm"), HasSubstr("at most 1e+12 Nm"));
+  EXPECT_THAT(message("mountign: 1%"), HasSubstr("Did you mean 'mounting'?"));
+  EXPECT_THAT(message(""), HasSubstr("at least one of class:"));
+  EXPECT_THAT(message("gain: 0%"), HasSubstr("at least one of class:"));
+  EXPECT_THAT(test::error_message([] {
+                (void)parse_mapping("uncertainty: {torque_Nm: {gain: 1%}, torque_mNm: {gain: 2%}}",
+                                    "m.yaml");
+              }),
+              HasSubstr("the uncertainty of torque_Nm is given twice"));
+  EXPECT_THAT(test::error_message(
+                  [] { (void)parse_mapping("uncertainty: {torque: {gain: 1%}}", "m.yaml"); }),
+              HasSubstr("a channel name that ends in a unit"));
 }
 
 TEST(Mapping, RefusesALatencyLongerThanTheRecord) {

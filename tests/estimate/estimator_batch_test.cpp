@@ -110,6 +110,7 @@ EstimatorSettings batch_settings(const std::string& second) {
   of.zeroed_channels = {};
   of.features.inputs[1] = second;
   of.disturbances = {.largest_step = {0.01, 0.01}, .largest_travel = 0.01, .warm_up_s = 0.02};
+  of.target_uncertainty = {.constant = 0.3, .relative = 0.05};
   of.strokes = {.longest_s = 0.05, .dead_band = 0.004, .growth = 0.5, .limit = 30.0};
   return of;
 }

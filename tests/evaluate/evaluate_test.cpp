@@ -54,6 +54,31 @@ TEST(Evaluate, CountsHowOftenTheTruthIsWithinTheErrorBar) {
   EXPECT_EQ(without.without_std_dev, 1.0);
 }
 
+TEST(Evaluate, CoverageIsWithoutTheErrorThatTheSensorOfTheTrainingHasInTheTest) {
+  Dataset dataset = test::bench_dataset();
+  ModelFile file = trained(dataset, "linear_coulomb").file;
+  const Score plain = evaluate(make_estimator(file), dataset, Role::test).together;
+  file.settings.target_uncertainty = {.constant = 3.0, .relative = 0.05};
+  const std::vector<ScoredRun> runs = scored_runs(make_estimator(file), dataset);
+  const Score stated = evaluate(runs, Role::test).together;
+  EXPECT_NEAR(stated.mean_std_dev, plain.mean_std_dev, 1e-9);
+  EXPECT_NEAR(stated.within_std_dev, plain.within_std_dev, 1e-3);
+  EXPECT_NEAR(stated.within_2_std_dev, plain.within_2_std_dev, 1e-3);
+  EXPECT_GT(runs.back().prediction.estimates.back().std_dev, 3.0);
+
+  // A known load and another sensor do not have it.
+  dataset.load_target = {.file = "load.yaml"};
+  EXPECT_GT(evaluate(make_estimator(file), dataset, Role::test).together.mean_std_dev, 3.0);
+  dataset.load_target = {};
+  for (DatasetRecord& record : dataset.records) {
+    Channel other = record.recording.channel(dataset.target);
+    other.name = "other_torque_Nm";
+    record.recording.add(std::move(other));
+  }
+  dataset.target = "other_torque_Nm";
+  EXPECT_GT(evaluate(make_estimator(file), dataset, Role::test).together.mean_std_dev, 3.0);
+}
+
 TEST(Evaluate, ScoresOnlyFreshSamples) {
   Dataset dataset = test::bench_dataset();
   Estimator estimator = make_estimator(trained(dataset, "linear").file);

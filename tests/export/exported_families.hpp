@@ -32,6 +32,7 @@ inline ModelFile guarded(const AnyModel& model) {
   file.settings.disturbances = {
       .largest_step = {0.01, 0.01}, .largest_travel = 0.01, .warm_up_s = 0.05};
   file.settings.output.largest_target = 400.0;
+  file.settings.target_uncertainty = {.constant = 0.3, .relative = 0.05};
   file.settings.strokes = {.longest_s = 0.05, .dead_band = 0.004, .growth = 0.5, .limit = 30.0};
   return file;
 }

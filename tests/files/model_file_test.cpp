@@ -81,6 +81,20 @@ TEST(ModelFile, KeepsTheMappingAndReadsFilesWithoutOne) {
   EXPECT_EQ(parse_model(model_bytes(saved), "m").card.mapping, saved.card.mapping);
 }
 
+TEST(ModelFile, KeepsTheUncertaintyOfTheTargetAndReadsFilesWithoutOne) {
+  ModelFile saved = example_model_file(example<Linear>());
+  const std::size_t tensors = parse_safetensors(model_bytes(saved), "m").tensors.size();
+  EXPECT_FALSE(parse_model(model_bytes(saved), "m").settings.target_uncertainty.is_stated());
+  saved.settings.target_uncertainty = {.constant = 0.21, .relative = 0.006};
+  EXPECT_EQ(parse_safetensors(model_bytes(saved), "m").tensors.size(), tensors + 2);
+  EXPECT_EQ(parse_model(model_bytes(saved), "m").settings.target_uncertainty,
+            saved.settings.target_uncertainty);
+  saved.settings.target_uncertainty.relative = -0.1;
+  const std::vector<std::byte> wrong = model_bytes(saved);
+  EXPECT_THAT(error_message([&] { (void)parse_model(wrong, "m"); }),
+              HasSubstr("target_uncertainty.relative"));
+}
+
 TEST(ModelFile, KeepsWhatHasNoEvidenceAsNaN) {
   ModelFile model = example_model_file(example<Linear>());
   model.card.metrics["rmse"] = kNotMeasured;

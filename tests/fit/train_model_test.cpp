@@ -34,6 +34,32 @@ TEST(TrainModel, TakesTheZerosOfTheTrainingRecords) {
   EXPECT_THROW((void)train_model(dataset, choice, 1), Error);
 }
 
+TEST(TrainModel, TakesTheLargestUncertaintyOfTheTargetThatATrainingRecordStates) {
+  Dataset dataset = test::bench_dataset();  // the last one is for the test
+  const ModelChoice choice{.family = "linear", .features = resolve_inputs(dataset, {})};
+  const ModelFile plain = train_model(dataset, choice, 1).file;
+  EXPECT_FALSE(plain.settings.target_uncertainty.is_stated());
+  dataset.records[0].recording.uncertainties = {{"torque_Nm", {.constant = 0.2, .relative = 0.01}},
+                                                {"gear_angle_rad", {.constant = 9.0}}};
+  dataset.records[2].recording.uncertainties = {{"torque_Nm", {.constant = 7.0}}};
+  TrainedModel trained = train_model(dataset, choice, 1);
+  EXPECT_EQ(trained.file.settings.target_uncertainty,
+            (SensorUncertainty{.constant = 0.2, .relative = 0.01}));
+  EXPECT_EQ(trained.notes.front(),
+            "the error bars contain the error of the reference sensor as it was stated, 0.2 Nm + 1 "
+            "% of the value (standard uncertainty); 1 of 2 recordings state none");
+  dataset.records[1].recording.uncertainties = {{"torque_Nm", {.constant = 0.3}}};
+  trained = train_model(dataset, choice, 1);
+  EXPECT_EQ(trained.file.settings.target_uncertainty,
+            (SensorUncertainty{.constant = 0.3, .relative = 0.01}));
+  EXPECT_NE(trained.notes.front().find(", the largest of the recordings"), std::string::npos);
+  EXPECT_EQ(trained.file.settings.residuals.std_dev, plain.settings.residuals.std_dev)
+      << "a term of its own";
+  dataset.load_target = {.file = "load.yaml", .computed_from = {"joint_angle_rad"}};
+  EXPECT_FALSE(train_model(dataset, choice, 1).file.settings.target_uncertainty.is_stated())
+      << "the error of a known load is in the residuals";
+}
+
 TEST(TrainModel, RecordsTheEpochsOfANetworkAndNoneOfAnotherFamily) {
   const Dataset dataset = test::bench_dataset();
   const FeatureSpec inputs = resolve_inputs(dataset, {});

@@ -35,6 +35,17 @@ TEST(ModelDescription, ShowsTheMappingOfTheTraining) {
   EXPECT_THAT(described(file), HasSubstr("  channels:\n    torque_Nm: {from: tau}\n"));
 }
 
+TEST(ModelDescription, StatesTheUncertaintyOfTheReferenceSensor) {
+  ModelFile file = test::example_model_file(test::example<Linear>());
+  EXPECT_THAT(described(file), testing::Not(HasSubstr("reference sensor")));
+  EXPECT_THAT(model_description_json(file, slow_cycle(file)),
+              HasSubstr("\"target_uncertainty\": null"));
+  file.settings.target_uncertainty = {.constant = 0.21, .relative = 0.006};
+  EXPECT_THAT(described(file), HasSubstr("reference sensor: 0.21 Nm + 0.6 % of the value (standard "
+                                         "uncertainty), as stated with the recordings"));
+  EXPECT_THAT(model_description_json(file, slow_cycle(file)), HasSubstr("\"relative\": 0.006"));
+}
+
 TEST(ModelDescription, OfANetworkIsALineALayer) {
   const std::string text = described(test::example_model_file(test::example<MlpEnsemble>()));
   EXPECT_THAT(text, HasSubstr("(mlp_ensemble) for torque_Nm at 1000 Hz"));

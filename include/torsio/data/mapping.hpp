@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "torsio/core/progress.hpp"
+#include "torsio/core/provenance.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
@@ -54,6 +55,23 @@ struct LatencyRule {
   double latency_s = 0.0;
 };
 
+/// What the sensor of a channel is wrong by in all recordings alike:
+///
+///     u(y)^2 = (class range)^2 / 3 + zero^2 + (gain^2 + mounting^2) y^2
+///
+/// A class is a limit of the error, every value within which is equally likely; the others are standard
+/// uncertainties. Percentages are kept as they are written, so that `mapping_text` repeats them.
+struct UncertaintyRule {
+  std::string channel;
+  double class_percent = 0.0;  ///< share of `range`
+  double range = 0.0;          ///< unit of the channel
+  double gain_percent = 0.0;   ///< share of the reading, as the next
+  double mounting_percent = 0.0;
+  double zero = 0.0;  ///< unit of the channel
+
+  [[nodiscard]] SensorUncertainty combined() const noexcept;
+};
+
 /// From the columns of a foreign log to channels. See docs/use/recordings.md for the file format.
 struct Mapping {
   std::string file;  ///< for messages; empty: no mapping
@@ -74,6 +92,7 @@ struct Mapping {
   std::vector<ZeroRule> zero;
   std::vector<std::string> hold;
   std::vector<LatencyRule> latency;
+  std::vector<UncertaintyRule> uncertainty;
   std::map<std::string, std::vector<std::string>> computed_from;
 };
 

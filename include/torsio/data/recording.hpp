@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -78,6 +79,8 @@ class Recording {
   /// back to measured ones.
   std::vector<ChannelDefinition> definitions;
   std::vector<ZeroRule> zeros;  ///< already applied to the values
+  /// By channel, as a mapping states them.
+  std::map<std::string, SensorUncertainty> uncertainties;
   /// For advice on a mapping; the clock is `t_s`. Empty for a recording that was not read from a file.
   std::vector<ColumnOfChannel> columns;
   std::string mapping;  ///< `mapping_text` of the mapping that it was read with; empty: none

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/provenance.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
@@ -138,6 +139,9 @@ struct EstimatorSettings {
   StrokeGuard strokes = {};
   LinearFallback fallback;
   ResidualTable residuals;
+  /// What the sensor from which the target was learned adds to every error bar, as a term of its own:
+  /// std_dev^2 += u(value)^2.
+  SensorUncertainty target_uncertainty = {};
 };
 
 }  // namespace torsio

@@ -8,6 +8,7 @@
 
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
+#include "torsio/core/provenance.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/numerics/metrics.hpp"
@@ -37,6 +38,11 @@ struct Corrections {
 [[nodiscard]] Prediction predict(Estimator estimator, const Recording& recording,
                                  const Corrections& corrections = {});
 
+/// What the error bars of a model contain and a comparison with this target does not show: the uncertainty of the sensor
+/// from which it was learned. None if it is compared with another channel.
+[[nodiscard]] SensorUncertainty common_uncertainty(const EstimatorSettings& settings,
+                                                   const std::string& target);
+
 /// One model on one recording of a dataset: scores, the report of a fit and the pages are made of
 /// this run, so that the model is run once.
 struct ScoredRun {
@@ -44,6 +50,7 @@ struct ScoredRun {
   const Channel* target = nullptr;
   Prediction prediction;                    ///< in free run
   std::optional<Prediction> one_step = {};  ///< one step ahead, for a model with feedback
+  SensorUncertainty common = {};            ///< `common_uncertainty`
 
   /// Whether the filters have settled and the sample did not initialise the model.
   [[nodiscard]] bool is_scored(std::size_t sample) const noexcept {
@@ -54,6 +61,11 @@ struct ScoredRun {
   [[nodiscard]] double residual(std::size_t sample) const noexcept {
     return is_scored(sample) ? prediction.estimates[sample].value - target->values[sample]
                              : kNotMeasured;
+  }
+  /// The error bar of a comparison with the target: without the error that both have.
+  [[nodiscard]] double compared_std_dev(std::size_t sample) const noexcept {
+    const Estimate& estimate = prediction.estimates[sample];
+    return common.taken_out_of(estimate.std_dev, estimate.value);
   }
 };
 
@@ -76,8 +88,8 @@ struct Score {
   /// On the samples that no model of the ranking guarded (`compare`, `cross_validate`); 0 samples:
   /// not ranked.
   Metrics common = {};
-  /// Shares of the scored samples whose error is at most one, or two, of their error bars;
-  /// NaN if none had one. A calibrated Gaussian error bar gives 0.683 and 0.954.
+  /// Shares of the scored samples whose error is at most one, or two, of their error bars
+  /// (`ScoredRun::compared_std_dev`); NaN if none had one. A calibrated Gaussian error bar gives 0.683 and 0.954.
   double within_std_dev = kNotMeasured;
   double within_2_std_dev = kNotMeasured;
   double mean_std_dev = kNotMeasured;     ///< mean error bar of the scored samples that have one

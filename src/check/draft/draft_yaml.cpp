@@ -87,6 +87,11 @@ std::string MappingDraft::yaml() const {
   for (const ColumnGuess& guess : columns)
     if (guess.is_written() && guess.holds) held.push_back(guess.channel);
   if (!held.empty()) text += fmt::format("hold: [{}]\n", joined(held));
+  const ColumnGuess* const torque = of("torque_Nm");
+  if (torque != nullptr && torque->is_written())
+    text +=
+        "# uncertainty: {torque_Nm: {class: CLASS, range: RANGE}}  # of the load cell, as 0.2% and "
+        "100Nm: then part of the error bars\n";
   if (!clock.empty()) text += fmt::format("clock: {}  # {}\n", clock, clock_reason);
   std::vector<std::string> drop;
   for (const std::string& column : dropped) drop.push_back(yaml_name(column));

@@ -281,6 +281,8 @@ Recording recording_of(const LogTable& table, TableChannels& columns, NamedRows 
   Recording recording(run.name, clock.sample_rate_Hz, clock.start_s);
   recording.source = table.source;
   recording.zeros = mapping.zero;
+  for (const UncertaintyRule& rule : mapping.uncertainty)
+    recording.uncertainties[rule.channel] = rule.combined();
   recording.columns = std::move(named);
   recording.labels = table.labels;
   recording.notes = table.notes;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "data/mapping/uncertainty.hpp"
 #include "torsio/data/mapping.hpp"
 
 namespace torsio {
@@ -29,6 +30,11 @@ class MappingWriter {
   }
   void add(const ChannelDefinition& definition) { entry(definition.name, definition.expression); }
   void add(const LatencyRule& rule) { entry(rule.channel, digits(rule.latency_s)); }
+  void add(const UncertaintyRule& rule) {
+    yaml_ << YAML::Key << rule.channel << YAML::Value << YAML::Flow << YAML::BeginMap;
+    for (const auto& [key, value] : entries_of(rule)) entry(key, value);
+    yaml_ << YAML::EndMap;
+  }
   void add(const std::pair<const std::string, std::vector<std::string>>& computed) {
     yaml_ << YAML::Key << computed.first << YAML::Value << YAML::Flow << computed.second;
   }
@@ -103,6 +109,7 @@ std::string mapping_text(const Mapping& mapping) {
   writer.list("zero", mapping.zero);
   writer.list("hold", mapping.hold);
   writer.map("latency", mapping.latency);
+  writer.map("uncertainty", mapping.uncertainty);
   writer.map("computed_from", mapping.computed_from);
   return writer.text();
 }

@@ -10,6 +10,7 @@
 #include "data/mapping/column_advice.hpp"
 #include "data/mapping/columns.hpp"
 #include "data/mapping/ready_mappings.hpp"
+#include "data/mapping/uncertainty.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -256,7 +257,7 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
                  .advice = "Give a manifest in the place of a recording, without --mapping."});
   of_joints.allow_only({"joints", "channels", "derive", "drop", "missing", "decimal", "skip_lines",
                         "split_by", "keep", "clock", "rate", "from", "to", "zero", "hold",
-                        "latency", "computed_from"});
+                        "latency", "uncertainty", "computed_from"});
   const YamlValue yaml = of_joint(of_joints, joint);
   Mapping mapping;
   mapping.file = yaml.file();
@@ -294,6 +295,8 @@ Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
     for (const auto& [name, value] : latency->entries())
       mapping.latency.push_back({.channel = si_channel_name(name, value.place()),
                                  .latency_s = value.positive_number("s")});
+  if (const auto uncertainty = yaml.find("uncertainty"))
+    mapping.uncertainty = uncertainties_from(*uncertainty);
   if (const auto computed = yaml.find("computed_from"))
     for (const auto& [name, from] : computed->entries())
       for (const YamlValue& channel : from.items())

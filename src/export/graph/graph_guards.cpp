@@ -145,6 +145,9 @@ GraphEstimate guarded(GraphBuilder& graph, const GraphGuards& guards, const Grap
   out.value = select(is_used, value, other);
   out.std_dev = select(is_used, widened_std_dev,
                        select(either(e.is_outside, tick.is_wrong_rate), kNotMeasured, of_fallback));
+  const SensorUncertainty& sensor = settings.target_uncertainty;
+  if (sensor.constant > 0.0) out.std_dev = hypotenuse(out.std_dev, graph.constant(sensor.constant));
+  if (sensor.relative > 0.0) out.std_dev = hypotenuse(out.std_dev, out.value * sensor.relative);
   out.fault =
       select(both(is_used, e.is_outside), fault_number(Fault::outside_training_range), fault);
   return out;

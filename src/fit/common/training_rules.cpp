@@ -88,6 +88,47 @@ std::vector<ZeroRule> training_zeros(const Dataset& dataset) {
   return first == nullptr ? std::vector<ZeroRule>{} : first->zeros;
 }
 
+namespace {
+
+/// The statement on the sensor of the target; null: none.
+const SensorUncertainty* stated_uncertainty(const Dataset& dataset, const DatasetRecord& record) {
+  const auto& stated = record.recording.uncertainties;
+  const auto of_target = stated.find(dataset.target);
+  return of_target == stated.end() ? nullptr : &of_target->second;
+}
+
+}  // namespace
+
+SensorUncertainty training_uncertainty(const Dataset& dataset) {
+  SensorUncertainty largest;
+  if (dataset.load_target.is_used()) return largest;
+  for (const DatasetRecord& record : dataset.records)
+    if (const SensorUncertainty* const stated = stated_uncertainty(dataset, record);
+        stated != nullptr && record.has_role(Role::train))
+      largest = larger_of(largest, *stated);
+  return largest;
+}
+
+std::string uncertainty_note(const Dataset& dataset) {
+  const SensorUncertainty largest = training_uncertainty(dataset);
+  if (!largest.is_stated()) return {};
+  std::size_t stating = 0;
+  std::size_t all = 0;
+  bool differ = false;
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(Role::train)) continue;
+    ++all;
+    const SensorUncertainty* const stated = stated_uncertainty(dataset, record);
+    stating += stated != nullptr ? 1 : 0;
+    differ = differ || (stated != nullptr && *stated != largest);
+  }
+  std::string note = "the error bars contain the error of the reference sensor as it was stated, " +
+                     uncertainty_text(largest, dataset.target);
+  if (differ) note += ", the largest of the recordings";
+  if (stating < all) note += fmt::format("; {} of {} recordings state none", all - stating, all);
+  return note;
+}
+
 void add_training_files(ModelCard& card, const Dataset& dataset) {
   for (const DatasetRecord& record : dataset.records) {
     if (!record.has_role(Role::train)) continue;

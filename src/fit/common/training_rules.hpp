@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/provenance.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/files/model_file.hpp"
@@ -20,6 +21,13 @@ inline constexpr double kLargestValue = 1e140;
 /// The zeros of the training records: a model expects a channel zeroed or not, never both.
 /// @throws Error naming the recordings that disagree.
 [[nodiscard]] std::vector<ZeroRule> training_zeros(const Dataset& dataset);
+
+/// The largest uncertainty of the target's sensor that a training record states, in each of its parts. None for
+/// a target that was computed from a known load, which contains its own error.
+[[nodiscard]] SensorUncertainty training_uncertainty(const Dataset& dataset);
+
+/// What a user should know of it, in one sentence; empty: nothing is stated.
+[[nodiscard]] std::string uncertainty_note(const Dataset& dataset);
 
 /// Adds the sources of the records with the role train, each once.
 void add_training_files(ModelCard& card, const Dataset& dataset);

@@ -68,6 +68,7 @@ void map_output(EstimatorSettings& settings, double gain, double offset) {
   for (double& std_dev : settings.residuals.std_dev) std_dev *= gain;
   settings.strokes.growth *= gain;
   settings.strokes.limit *= gain;
+  settings.target_uncertainty.constant *= gain;
 }
 
 bool is_positive(double value) { return value > 0.0 && std::isfinite(value); }
@@ -345,6 +346,9 @@ class Transfer {
       settings.ranges.lowest[i] = std::min(settings.ranges.lowest[i], fresh.ranges.lowest[i]);
       settings.ranges.highest[i] = std::max(settings.ranges.highest[i], fresh.ranges.highest[i]);
     }
+    // The new recordings determine the torque; what they do not state remains that of the base.
+    if (const SensorUncertainty stated = training_uncertainty(dataset_); stated.is_stated())
+      settings.target_uncertainty = stated;
     file.card.device_serial.clear();
     file.card.metrics.clear();
     file.card.held_out.clear();

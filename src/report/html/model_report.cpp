@@ -167,6 +167,7 @@ ReportSection card_section(const ModelFile& file, const std::string& title) {
     add("trained on", fmt::format("{}, SHA-256 {}", source.file, source.sha256));
   if (card.load_target.is_used())
     add("known load", fmt::format("{}", fmt::join(load_target_notes(card.load_target), "; ")));
+  add("reference sensor", uncertainty_text(file.settings.target_uncertainty, file.settings.target));
   add("scored on", card.held_out);
   for (const auto& [metric, value] : card.metrics) add(metric, fmt::format("{:.4g}", value));
   add("device", card.device_serial);

@@ -24,7 +24,7 @@ ModelRun sample_by_sample(const ScoredRun& scored, const std::string& label, Rol
     const Estimate& estimate = estimates[n];
     if (estimate.fault == Fault::warming_up) continue;
     run.value[n] = estimate.value;
-    run.std_dev[n] = estimate.std_dev;
+    run.std_dev[n] = scored.compared_std_dev(n);
     run.guarded[n] = estimate.fault != Fault::none ? 1 : 0;
   }
   for (const Segment& segment : scored.record->segments) {
@@ -42,12 +42,8 @@ ModelRun run_model(const Dataset& dataset, const DatasetRecord& record, const Re
     if (known != model.runs->end()) return sample_by_sample(*known, model.label, role);
   }
   const Recording& recording = record.recording;
-  const Channel& target = recording.channel(dataset.target);
   return sample_by_sample(
-      {.record = &record,
-       .target = &target,
-       .prediction = predict(make_estimator(*model.file, recording.sample_rate_Hz()), recording,
-                             {&target, dataset.initialise_samples})},
+      scored_run(make_estimator(*model.file, recording.sample_rate_Hz()), dataset, record),
       model.label, role);
 }
 

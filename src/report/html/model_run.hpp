@@ -12,7 +12,7 @@ namespace torsio {
 struct ModelRun {
   std::string label;
   std::vector<double> value;
-  std::vector<double> std_dev;   ///< NaN without an error bar
+  std::vector<double> std_dev;   ///< `ScoredRun::compared_std_dev`; NaN without an error bar
   std::vector<double> residual;  ///< estimate less target at new samples that are scored; else NaN
   std::vector<std::uint8_t> guarded;  ///< 1: a guard or fault
 };

@@ -170,6 +170,21 @@ TEST(MappingDraft, TakesTheRatioFromASecondLogInWhichTheJointMovesFreely) {
               HasSubstr("expected the columns and units of log.csv: t_s, motor_angle_rad"));
 }
 
+TEST(MappingDraft, OffersTheErrorOfTheTorqueSensor) {
+  std::string text = "t_s,motor_angle_rad,joint_angle_rad,torque_Nm\n";
+  for (int row = 0; row < 800; ++row) {
+    const test::JointState state = test::joint_at(row);
+    text += fmt::format("{:.3f},{:.6f},{:.6f},{:.5f}\n", state.t_s, state.motor_rad,
+                        state.joint_rad, state.torque_Nm);
+  }
+  std::string yaml = draft_of(text).yaml();
+  const std::string line = "# uncertainty: {torque_Nm: {class: CLASS, range: RANGE}}";
+  const std::size_t at = yaml.find(line);
+  ASSERT_NE(at, std::string::npos) << yaml;
+  yaml.replace(at, line.size(), "uncertainty: {torque_Nm: {class: 0.2%, range: 100Nm}}");
+  EXPECT_EQ(parse_mapping(yaml, "draft").uncertainty.size(), 1U) << yaml;
+}
+
 TEST(MappingDraft, WithoutATorqueALittleMotionShowsNoSureRatio) {
   std::string text = "t_s,motor_angle_rad,joint_angle_rad\n";
   for (int row = 0; row < 800; ++row)

@@ -108,6 +108,22 @@ TEST_P(MappedFamily, ComesCloserToANewJointThanTheBase) {
 INSTANTIATE_TEST_SUITE_P(Families, MappedFamily, testing::ValuesIn(kFamilies),
                          [](const auto& of) { return of.param; });
 
+TEST(Transfer, TheUncertaintyOfTheTargetIsThatOfTheNewRecordings) {
+  ModelFile base = base_model("linear");
+  base.settings.target_uncertainty = {.constant = 0.5, .relative = 0.02};
+  EXPECT_EQ(mapped(base, {.gain = 3.0}).settings.target_uncertainty,
+            (SensorUncertainty{.constant = 1.5, .relative = 0.02}));
+  Dataset joint = test::one_recording({.seed = 4});
+  EXPECT_EQ(transfer_model(base, joint, {.method = TransferMethod::none})
+                .best()
+                .file.settings.target_uncertainty,
+            base.settings.target_uncertainty);
+  const SensorUncertainty stated{.constant = 0.1, .relative = 0.003};
+  joint.records[0].recording.uncertainties = {{"torque_Nm", stated}};
+  for (const TransferTrial& each : transfer_model(base, joint).trials)
+    EXPECT_EQ(each.file.settings.target_uncertainty, stated) << name(each.method);
+}
+
 TEST(Transfer, TheOffsetIsTheMeanErrorOfTheFirstSamples) {
   const ModelFile base = base_model("linear");
   const Dataset joint = test::one_recording({.offset_Nm = 5.0, .friction_Nm = 0.0, .seed = 4});

@@ -1,0 +1,102 @@
+#include "data/mapping/uncertainty.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/quantity.hpp"
+#include "core/trimmed.hpp"
+#include "data/mapping/mapping_yaml.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kLargestReading = 1e12;  // in the SI unit of the channel
+
+/// "0.5%" as 0.5.
+double percent(const YamlValue& value, std::string_view of) {
+  const std::string text = value.text();
+  const std::string_view all = trimmed(text);
+  if (!all.ends_with('%'))
+    value.refuse(fmt::format("a share of the {} in %, as 0.2%", of),
+                 all.find_first_not_of("0123456789.") == std::string_view::npos
+                     ? fmt::format("Write {}% if percent are meant, as a class is.", all)
+                     : "");
+  const double number = si_quantity(all.substr(0, all.size() - 1), "1", value.place());
+  if (!(number >= 0.0 && number < 100.0))
+    value.refuse(fmt::format("a share of the {}, from 0% to below 100%", of));
+  return number;
+}
+
+double reading(const YamlValue& value, std::string_view si_unit) {
+  const double number = quantity_with_unit(value.text(), si_unit, value.place());
+  if (!(number <= kLargestReading))
+    value.refuse(fmt::format("at most {:g} {}", kLargestReading, si_unit));
+  return number;
+}
+
+UncertaintyRule rule_of(const std::string& name, const YamlValue& yaml) {
+  UncertaintyRule rule{.channel = si_channel_name(name, yaml.place())};
+  const std::string unit(split_channel_name(rule.channel)->unit->si_suffix);
+  yaml.allow_only({"class", "range", "gain", "mounting", "zero"});
+  const auto accuracy_class = yaml.find("class");
+  const auto range = yaml.find("range");
+  if (accuracy_class) rule.class_percent = percent(*accuracy_class, "range");
+  if (range) rule.range = reading(*range, unit);
+  if (accuracy_class && !(rule.range > 0.0))
+    accuracy_class->refuse("the range of the sensor beside it",
+                           fmt::format("A class is a share of the range:  class: {}, range: 100{}",
+                                       accuracy_class->text(), unit));
+  if (range && !accuracy_class) range->refuse("class: beside range:, as  class: 0.2%");
+  if (const auto gain = yaml.find("gain")) rule.gain_percent = percent(*gain, "reading");
+  if (const auto mounting = yaml.find("mounting"))
+    rule.mounting_percent = percent(*mounting, "reading");
+  if (const auto zero = yaml.find("zero")) rule.zero = reading(*zero, unit);
+  if (!rule.combined().is_stated())
+    yaml.refuse(
+        fmt::format("at least one of class: with range:, gain:, mounting: and zero:, as  "
+                    "{{class: 0.2%, range: 100{0}, gain: 0.5%, zero: 0.1{0}}}",
+                    unit));
+  return rule;
+}
+
+}  // namespace
+
+SensorUncertainty UncertaintyRule::combined() const noexcept {
+  constexpr double kPercent = 0.01;
+  return {.constant = std::hypot(kPercent * class_percent * range / std::numbers::sqrt3, zero),
+          .relative = kPercent * std::hypot(gain_percent, mounting_percent)};
+}
+
+std::vector<UncertaintyRule> uncertainties_from(const YamlValue& yaml) {
+  std::vector<UncertaintyRule> rules;
+  for (const auto& [name, value] : yaml.entries()) {
+    UncertaintyRule rule = rule_of(name, value);
+    if (std::ranges::find(rules, rule.channel, &UncertaintyRule::channel) != rules.end())
+      throw Error({.place = value.place(),
+                   .problem = fmt::format("the uncertainty of {} is given twice", rule.channel)});
+    rules.push_back(std::move(rule));
+  }
+  return rules;
+}
+
+std::vector<std::pair<std::string, std::string>> entries_of(const UncertaintyRule& rule) {
+  const std::string unit(split_channel_name(rule.channel)->unit->si_suffix);
+  std::vector<std::pair<std::string, std::string>> entries;
+  const auto add = [&](const char* key, double value, const std::string& of) {
+    if (value > 0.0) entries.emplace_back(key, fmt::format("{}{}", value, of));
+  };
+  add("class", rule.class_percent, "%");
+  add("range", rule.range, unit);
+  add("gain", rule.gain_percent, "%");
+  add("mounting", rule.mounting_percent, "%");
+  add("zero", rule.zero, unit);
+  return entries;
+}
+
+}  // namespace torsio
