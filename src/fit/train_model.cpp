@@ -156,6 +156,15 @@ std::string note_of_reversals(const TrainingData& training, std::size_t reversal
                      : "twice the error in the training, as in public recordings of few strokes");
 }
 
+/// Where few recordings are the reason for wider error bars.
+std::string note_of_recordings(std::size_t recordings, double factor) {
+  return fmt::format(
+      "the error bars are {:g} times as wide as the training shows: {} not determine how "
+      "much other recordings differ, and public ones of other days or loads need this factor; "
+      "with three recordings or with --validation the error bars follow from them",
+      factor, recordings == 1 ? "one recording does" : "two recordings do");
+}
+
 TrainedModel train(const Dataset& dataset, const LearningData& data, const ModelChoice& choice,
                    FitContext context) {
   const FamilyInfo& family = find_family(choice.family);
@@ -203,7 +212,13 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   if (family.is_spring && has_memory && !held_out.has_return)
     refuse_motion_without_return(data.training);
   note_unexplained(data.training.target, held_out, notes);
-  if (reversals < kFewReversals) notes.push_back(note_of_reversals(data.training, reversals));
+  const std::size_t recordings = recordings_of(dataset);
+  const double factor = other_recordings_factor(recordings, reversals);
+  if (reversals < kFewReversals) {
+    notes.push_back(note_of_reversals(data.training, reversals));
+  } else if (factor != 1.0 && !data.validation) {
+    notes.push_back(note_of_recordings(recordings, factor));
+  }
   TrainedModel trained{.file = {.card = std::move(card),
                                 .settings = std::move(settings),
                                 .parameters = fitted.model.parameters()},

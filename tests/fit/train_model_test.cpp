@@ -60,6 +60,25 @@ TEST(TrainModel, TakesTheLargestUncertaintyOfTheTargetThatATrainingRecordStates)
       << "the error of a known load is in the residuals";
 }
 
+TEST(TrainModel, StatesWhyErrorBarsOfFewRecordingsAreWider) {
+  Dataset dataset = test::bench_dataset();
+  const ModelChoice choice{.family = "linear_coulomb", .features = resolve_inputs(dataset, {})};
+  const auto notes = [&] {
+    std::string text;
+    for (const std::string& note : train_model(dataset, choice, 1).notes) text += note + "\n";
+    return text;
+  };
+  const std::string of_two = notes();
+  EXPECT_NE(of_two.find("the error bars are 1.2 times as wide as the training shows: two "
+                        "recordings do not determine"),
+            std::string::npos)
+      << of_two;
+  dataset.records.erase(dataset.records.begin());
+  EXPECT_NE(notes().find("the error bars are 1.5 times as wide"), std::string::npos) << notes();
+  dataset.records.back().segments.front().role = Role::validation;
+  EXPECT_EQ(notes().find("times as wide"), std::string::npos) << notes();
+}
+
 TEST(TrainModel, RecordsTheEpochsOfANetworkAndNoneOfAnotherFamily) {
   const Dataset dataset = test::bench_dataset();
   const FeatureSpec inputs = resolve_inputs(dataset, {});
