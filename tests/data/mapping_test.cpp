@@ -621,6 +621,15 @@ TEST(Mapping, CompensatesALatencyByWholeSamples) {
   EXPECT_TRUE(std::isnan(values[2]));
 }
 
+TEST(Mapping, OfAColumnThatALogDoesNotHaveNamesTheDraft) {
+  EXPECT_THAT(test::error_message([] {
+                (void)read("t_s,tau\n0,1\n1,2\n", "channels: {torque_Nm: {from: tua, unit: Nm}}");
+              }),
+              testing::AllOf(testing::HasSubstr("has no column 'tua'"),
+                             testing::HasSubstr("Did you mean 'tau'?\n  A draft"),
+                             testing::HasSubstr("torsio map log.csv -o mapping.yaml")));
+}
+
 TEST(Mapping, StatesTheUncertaintyOfASensor) {
   const Recording recording =
       read("t_s,torque_Nm\n0,1\n0.01,2\n",

@@ -290,10 +290,12 @@ LogColumn& column_named(LogTable& table, const std::string& name, const std::str
   const auto at = std::ranges::find(table.columns, name, &LogColumn::name);
   if (at != table.columns.end()) return *at;
   const std::vector<std::string> names = table.column_names();
+  std::string advice = did_you_mean(name, names);
+  if (!advice.empty()) advice += "\n  ";
   throw Error({.place = place,
                .problem = fmt::format("{} has no column '{}'", table.source.file, name),
                .found = "the columns " + joined(names),
-               .advice = did_you_mean(name, names)});
+               .advice = advice + advice_on_drafts(table)});
 }
 
 TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {

@@ -41,12 +41,7 @@ std::string known_units_line() {
          known_unit_list();
 }
 
-/// From its values as well, which a message does not have.
-std::string line_on_drafts(const LogTable& table) {
-  return fmt::format(
-      "\n  A draft of a mapping from names and values:  torsio map {} -o mapping.yaml",
-      table.source.file);
-}
+std::string line_on_drafts(const LogTable& table) { return "\n  " + advice_on_drafts(table); }
 
 [[noreturn]] void refuse_one(const LogTable& table, const LogColumn& column) {
   const auto ending = column.name.rfind('_');
@@ -84,6 +79,11 @@ std::string line_on_drafts(const LogTable& table) {
 }
 
 }  // namespace
+
+std::string advice_on_drafts(const LogTable& table) {
+  return fmt::format("A draft of a mapping from names and values:  torsio map {} -o mapping.yaml",
+                     table.source.file);
+}
 
 void refuse_columns_without_unit(const LogTable& table, const std::set<const LogColumn*>& used) {
   std::vector<std::string> names;
