@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -359,14 +360,16 @@ void Checker::report_line(std::size_t r, const RecordLine& line, double spread) 
                     unit_label(dataset_.target), others,
                     std::abs(line.offset) > spread ? ", more than the range of the torque" : "",
                     zero_of_input_text(r, line.offset)),
-        is_deflection(r)
-            ? fmt::format(
-                  "Remove the zero of each recording in the mapping, at rest without load:  "
-                  "{}  or that of {}, if its sensor drifts. Where a recording does not begin at "
-                  "rest, an offset: of its channel corrects it; evaluate with a model states by "
-                  "how "
-                  "much",
-                  zero_line(0.1), dataset_.target)
+        is_deflection(r) && !all_begin_at_rest()
+            ? fmt::format("Not all recordings begin at rest, where a zero could be taken: an "
+                          "offset: of one of {} corrects it, or of {}, if its sensor drifts; "
+                          "evaluate with a model states by how much. Begin recordings at rest "
+                          "without load",
+                          fmt::join(sources_, ", "), dataset_.target)
+        : is_deflection(r)
+            ? fmt::format("Remove the zero of each recording in the mapping, at rest without "
+                          "load:  {}  or that of {}, if its sensor drifts",
+                          zero_line(kUsualRest_s), dataset_.target)
             : "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: "
               "0.1s}]");
   if (std::abs(line.slope - 1.0) > kGainChange && recording.conditions().empty())

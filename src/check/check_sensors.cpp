@@ -1,6 +1,7 @@
 // What a sensor writes is not a measurement: numbers in another coding, values that are held, a torque that is switched
 // off, a zero that was taken in motion.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -288,13 +289,29 @@ std::string Checker::zero_line(double first_s) const {
   return fmt::format("zero: [{}]", rules);
 }
 
+/// Whether the first input's channels rest in the first moments, where a zero can be taken.
+bool Checker::begins_at_rest(std::size_t r) const {
+  const Recording& recording = dataset_.records[r].recording;
+  const auto samples =
+      static_cast<std::size_t>(std::round(kUsualRest_s * recording.sample_rate_Hz()));
+  return std::ranges::none_of(sources_, [&](const std::string& source) {
+    return recording.has(source) &&
+           moved_within(recording.channel(source), samples) > kZeroShare * range_in_use(r, source);
+  });
+}
+
+bool Checker::all_begin_at_rest() const {
+  for (std::size_t r = 0; r < dataset_.records.size(); ++r)
+    if (!begins_at_rest(r)) return false;
+  return true;
+}
+
 // A spring that carries no torque is not twisted: otherwise an encoder has another zero, as an incremental one after each
 // start.
 void Checker::check_unloaded(std::size_t r) {
   constexpr double kNearZero = 0.04;   // share of the range of the torque
   constexpr double kBothSides = 0.05;  // share of it on either side of zero
   constexpr double kFarOff = 0.15;     // share of the range of the deflection
-  constexpr double kUsualRest_s = 0.1;
   if (!is_deflection(r)) return;
   const auto target = split_channel_name(dataset_.target);
   if (!target || target->unit->si_suffix != "Nm") return;
@@ -329,10 +346,16 @@ void Checker::check_unloaded(std::size_t r) {
                   100.0 * std::abs(zero_rad) / twist.width(), twist.width()),
       has_zero ? "The zero of the mapping was taken while the spring was loaded: take it at rest "
                  "without load."
-               : fmt::format("An encoder or the torque sensor has another zero; that of an "
-                             "incremental encoder changes with each start. Mapping line for a "
-                             "recording that begins at rest without load:  {}",
-                             zero_line(kUsualRest_s)));
+      : begins_at_rest(r)
+          ? fmt::format("An encoder or the torque sensor has another zero; that of an "
+                        "incremental encoder changes with each start. Mapping line for a "
+                        "recording that begins at rest without load:  {}",
+                        zero_line(kUsualRest_s))
+          : fmt::format("An encoder or the torque sensor has another zero; that of an incremental "
+                        "encoder changes with each start. This recording begins in motion, so that "
+                        "no zero can be taken from it: record once more from rest without load, or "
+                        "correct it with an offset: of one of {}.",
+                        fmt::join(sources_, ", ")));
 }
 
 }  // namespace torsio

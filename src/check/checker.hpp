@@ -128,6 +128,8 @@ class Checker {
   void check_unloaded(std::size_t r);
   [[nodiscard]] bool is_deflection(std::size_t r) const;
   [[nodiscard]] std::string zero_line(double first_s) const;
+  [[nodiscard]] bool begins_at_rest(std::size_t r) const;
+  [[nodiscard]] bool all_begin_at_rest() const;
   [[nodiscard]] std::string zero_of_input_text(std::size_t r, double offset) const;
   void take_out_other_inputs();
   void check_explanation();
@@ -217,6 +219,7 @@ class Checker {
   static constexpr double kScaleOfAGear = 0.03;
   static constexpr double kOffsetShare = 0.05;
   static constexpr double kZeroShare = 0.02;      ///< share of the range
+  static constexpr double kUsualRest_s = 0.1;     ///< at the beginning of a recording
   static constexpr double kMaxUnexplained = 0.5;  ///< share of the variance
   static constexpr double kGainChange = 0.12;
   static constexpr double kClearDelay_s = 0.03;

@@ -290,6 +290,9 @@ TEST(CheckOffsets, WarnWhereTheTorqueIsZeroAtADeflection) {
   EXPECT_NE(text_of(findings).find("torque_Nm is zero at spring_deflection_rad = 0.0"),
             std::string::npos)
       << text_of(findings);
+  const std::string advice = first_of(findings, "offsets").advice;
+  EXPECT_NE(advice.find("begins in motion"), std::string::npos) << advice;
+  EXPECT_EQ(advice.find("zero: ["), std::string::npos) << "no zero can be taken there: " << advice;
 }
 
 /// A log that begins at rest without load, of encoders with that zero.
