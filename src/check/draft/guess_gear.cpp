@@ -132,6 +132,19 @@ Certainty certainty_of(const GearFit& fit, double ratio) {
   return Certainty::unsure;
 }
 
+/// Why a ratio is no more than `unsure`; empty if it is more.
+std::string reason_of_doubt(const GearFit& fit, double ratio) {
+  if (certainty_of(fit, ratio) != Certainty::unsure) return {};
+  if (fit.doubt > kSomeDoubt)
+    return fmt::format(", and {:.4g} to {:.4g} fit alike", (1.0 - fit.doubt) * ratio,
+                       (1.0 + fit.doubt) * ratio);
+  if (fit.explained > kMovesMuch)
+    return fmt::format(", no whole number and determined to {:.2g} % only",
+                       100.0 * fit.error / ratio);
+  return fmt::format(", which explains {:.3g} % of the variance of its motion only",
+                     100.0 * fit.explained);
+}
+
 /// The ratio is not written, since others fit as well.
 void leave_ratio_open(DraftWork& work, const Angles& angles, const GearFit& fit) {
   ColumnGuess& motor = work.draft.columns[angles.before];
@@ -181,7 +194,7 @@ void take_ratio(DraftWork& work, const Angles& angles, GearFit fit) {
     motor.missing = "the gear ratio: check the units of both angles";
   } else {
     motor.gear_ratio = ratio;
-    motor.add(certainty_of(fit, ratio), reason);
+    motor.add(certainty_of(fit, ratio), reason + reason_of_doubt(fit, ratio));
   }
   if (motor.sign < 0.0)
     motor.add(Certainty::unsure, "relation: one of the two angles has the wrong sign");

@@ -21,6 +21,7 @@
 #include "support/error_message.hpp"
 #include "support/file_bytes.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
 #include "torsio/data/mapping.hpp"
 
 namespace torsio {
@@ -168,6 +169,28 @@ TEST(MappingDraft, TakesTheRatioFromASecondLogInWhichTheJointMovesFreely) {
   const std::vector<LogTable> others = {tables.front(), table_of(joint_log("t_s,a,b,c"))};
   EXPECT_THAT(error_message([&] { (void)draft_mapping(others); }),
               HasSubstr("expected the columns and units of log.csv: t_s, motor_angle_rad"));
+}
+
+TEST(MappingDraft, StatesWhyARatioIsUnsure) {
+  // A drive that slips by another amount each time: no ratio explains it.
+  Random random(5);
+  double slip = 0.0;
+  std::string text = "t_s,motor_angle_rad,joint_angle_rad,torque_Nm\n";
+  for (int row = 0; row < 800; ++row) {
+    const test::JointState state = test::joint_at(row);
+    slip += 0.12 * random.normal();
+    text += fmt::format("{:.3f},{:.6f},{:.6f},{:.5f}\n", state.t_s, state.motor_rad + slip,
+                        state.joint_rad, state.torque_Nm);
+  }
+  const MappingDraft draft = draft_of(text);
+  const ColumnGuess* const motor = draft.of("gear_angle_rad");
+  ASSERT_NE(motor, nullptr) << draft.yaml();
+  ASSERT_EQ(motor->certainty, Certainty::unsure) << draft.yaml();
+  ASSERT_GT(motor->gear_ratio, 1.0) << draft.yaml();
+  EXPECT_THAT(motor->reasons,
+              testing::Contains(testing::AnyOf(HasSubstr("fit alike"), HasSubstr("% only"),
+                                               HasSubstr("of its motion only"))))
+      << draft.yaml();
 }
 
 TEST(MappingDraft, OffersTheErrorOfTheTorqueSensor) {
