@@ -18,6 +18,7 @@
 #include "evaluate/constant_offset.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "evaluate/left_ranges.hpp"
+#include "evaluate/model_entry.hpp"
 #include "evaluate/model_label.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -121,6 +122,8 @@ std::optional<TrainedModel> best_of(std::vector<ScoredModel>& models, Role chose
 }
 
 }  // namespace
+
+void check_model_entry(std::string_view entry) { static_cast<void>(parse_choice(entry)); }
 
 std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view models,
                                        const std::vector<std::string>& wanted_inputs) {

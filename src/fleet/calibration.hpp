@@ -116,7 +116,7 @@ struct FleetCalibration {
   struct OfType {
     std::string type;
     std::vector<std::size_t> members = {};             ///< in `FleetCalibration::joints`
-    std::array<OutlierTest, kJointTraits> tests = {};  ///< values, or the logarithms of sizes
+    std::array<OutlierTest, kJointTraits> tests = {};  ///< their values are those of `compared`
     /// False: too few joints, none of which can be an outlier.
     [[nodiscard]] bool is_compared() const noexcept;
   };

@@ -73,6 +73,8 @@ FleetJson traits_json(const JointTraits& traits) {
 JointTraits traits_from(const FleetJson& json) {
   JointTraits traits;
   for (const JointTrait trait : kAllJointTraits) {
+    // Results of an earlier version are without the asymmetry.
+    if (trait == JointTrait::asymmetry && !json.contains(name(trait))) continue;
     const FleetJson& of = json.at(std::string(name(trait)));
     traits[trait] = {.value = number_from(of.at("value")),
                      .std_error = number_from(of.at("std_error")),

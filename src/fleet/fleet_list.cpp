@@ -5,10 +5,10 @@
 #include <set>
 
 #include "data/yaml_reader.hpp"
+#include "evaluate/model_entry.hpp"
 #include "fleet/calibration.hpp"
 #include "search/specimen_study.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/fit/families.hpp"
 
 namespace torsio {
 namespace {
@@ -114,7 +114,7 @@ CalibrationRequest calibration_request(const FleetChoice& choice) {
   if (!choice.base.empty()) request.base = choice.base;
   if (!choice.model.empty()) request.model = choice.model;
   // Refused here and not once for each joint, when the study has its name already.
-  static_cast<void>(find_family(request.model.substr(0, request.model.find(':'))));
+  check_model_entry(request.model);
   request.seed = choice.seed;
   request.only_compares = choice.only_compares;
   return request;

@@ -18,14 +18,10 @@ OutlierOptions options_for(JointTrait trait) {
   // What a remounted load cell may show, docs/robot/drift.md.
   constexpr double kScaleTolerance = 0.012;
   constexpr double kFrictionTolerance = 0.04;
-  if (trait == JointTrait::stiffness) options.tolerance = kScaleTolerance;
+  if (trait == JointTrait::stiffness || trait == JointTrait::asymmetry)
+    options.tolerance = kScaleTolerance;
   if (trait == JointTrait::friction) options.tolerance = kFrictionTolerance;
   return options;
-}
-
-double compared_value(const CalibratedJoint& joint, JointTrait trait) {
-  const double value = joint.traits[trait].value;
-  return is_size(trait) ? std::log(value) : value;
 }
 
 /// How many times as far as the limit of its side a value lies from the median.
@@ -54,7 +50,7 @@ void add_outliers(FleetCalibration& fleet, const FleetCalibration::OfType& type)
     FleetOutlier outlier{.joint = members[m],
                          .trait = kind,
                          .value = fleet.joints[members[m]].traits[kind].value,
-                         .median = is_size(kind) ? std::exp(test.median) : test.median,
+                         .median = natural(kind, test.median),
                          .expected = test.scores[m].expected};
     for (std::size_t k = 1; k < found.size(); ++k) outlier.others.push_back(found[k].second);
     fleet.outliers.push_back(std::move(outlier));
@@ -85,7 +81,8 @@ void find_fleet_outliers(FleetCalibration& fleet) {
     for (const JointTrait trait : kAllJointTraits) {
       std::vector<double> values;
       values.reserve(members.size());
-      for (const std::size_t i : members) values.push_back(compared_value(fleet.joints[i], trait));
+      for (const std::size_t i : members)
+        values.push_back(compared(trait, fleet.joints[i].traits[trait].value));
       of.tests.at(static_cast<std::size_t>(trait)) = find_outliers(values, options_for(trait));
     }
     add_outliers(fleet, of);

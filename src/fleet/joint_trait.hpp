@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -10,29 +11,43 @@
 
 namespace torsio {
 
-/// The properties in which joints of one type are compared. Each is a kind of fault of production.
+/// The properties in which joints of one type are compared. Each is a kind of fault of production. Stores have the
+/// numbers: new ones are added at the end.
 enum class JointTrait : std::uint8_t {
-  stiffness,      ///< relative to the base model; a gain of the load cell looks the same
-  friction,       ///< friction of the spring, relative to the base model
+  stiffness,  ///< relative to the base model; a gain of the load cell looks the same
+  friction,  ///< work until the friction of the spring slides, relative to the base model: torque times angle
   zero,           ///< offset of the torque at the same deflection
   backlash,       ///< additional half play
   encoder_error,  ///< amplitude of an error that repeats with an angle
   loose_sensor,   ///< wander of the zero from one change of the load's sign to the next
   noise,          ///< what none of these explains
+  asymmetry,  ///< half of the difference of the stiffness between both signs of the load, relative
 };
 
-inline constexpr std::size_t kJointTraits = 7;
+inline constexpr std::size_t kJointTraits = 8;
+/// In the order of tables.
 inline constexpr std::array<JointTrait, kJointTraits> kAllJointTraits{
-    JointTrait::stiffness,     JointTrait::friction,     JointTrait::zero, JointTrait::backlash,
-    JointTrait::encoder_error, JointTrait::loose_sensor, JointTrait::noise};
+    JointTrait::stiffness, JointTrait::asymmetry,     JointTrait::friction,     JointTrait::zero,
+    JointTrait::backlash,  JointTrait::encoder_error, JointTrait::loose_sensor, JointTrait::noise};
 
-/// "stiffness", "friction", "zero", "backlash", "encoder error", "loose sensor", "noise"
+/// "stiffness", "asymmetry", "friction", "zero", "backlash", "encoder error", "loose sensor", "noise"
 [[nodiscard]] std::string_view name(JointTrait trait) noexcept;
 
-/// Whether it is an amplitude: only large ones are faults, and joints are compared by the logarithm.
+/// Whether it is an amplitude: only large ones are faults.
 [[nodiscard]] constexpr bool is_size(JointTrait trait) noexcept {
   return trait == JointTrait::encoder_error || trait == JointTrait::loose_sensor ||
          trait == JointTrait::noise;
+}
+
+/// The form in which joints are compared: sizes by their logarithm, the friction by that of its factor.
+[[nodiscard]] inline double compared(JointTrait trait, double value) {
+  if (is_size(trait)) return std::log(value);
+  return trait == JointTrait::friction ? std::log1p(value) : value;
+}
+/// The inverse: the value of a limit or median of a test.
+[[nodiscard]] inline double natural(JointTrait trait, double value) {
+  if (is_size(trait)) return std::exp(value);
+  return trait == JointTrait::friction ? std::expm1(value) : value;
 }
 
 /// The traits of one joint against the model of its family.

@@ -2,11 +2,14 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <numbers>
 
+#include "evaluate/drift/joint_difference.hpp"
 #include "evaluate/drift/verdicts.hpp"
+#include "numerics/quantile.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -24,6 +27,19 @@ JointTraits::Value absolute(const DriftQuantity& of) {
   return {.value = of.change,
           .std_error = 0.5 * (of.highest - of.lowest) / kIntervalOverError,
           .unit = of.unit};
+}
+
+/// The work until friction slides: its torque times its break-away angles, which are 2^`break_away` times the base's.
+/// Where these are unknown, the torque.
+JointTraits::Value friction_work(const JointTraits::Value& friction,
+                                 const JointTraits::Value& break_away) {
+  if (!std::isfinite(friction.value) || !std::isfinite(break_away.value)) return friction;
+  constexpr double kLeastTorque = 0.01;  // friction that has vanished, or an estimate below it
+  const double torque = std::max(kLeastTorque, 1.0 + friction.value);
+  const double work = torque * std::exp2(break_away.value);
+  return {.value = work - 1.0,
+          .std_error = work * std::hypot(friction.std_error / torque,
+                                         std::numbers::ln2 * break_away.std_error)};
 }
 
 /// Samples of the residual over one angle.
@@ -98,6 +114,36 @@ class PeriodicFit {
   double parabola_ = 0.0;
 };
 
+/// The mean residual of each part between two changes of the load's sign: first those of negative load.
+std::array<std::vector<double>, 2> means_by_sign(const Drift& drift) {
+  constexpr double kDeadBand = 0.05;  // share of the largest elastic torque
+  double largest = 0.0;
+  for (const DriftResidual& at : drift.residual) largest = std::max(largest, std::abs(at.elastic));
+  std::array<std::vector<double>, 2> means;
+  double sum = 0.0;
+  std::size_t samples = 0;
+  double sign = 0.0;
+  const auto end_part = [&] {
+    constexpr std::size_t kLeastSamples = 10;
+    if (samples >= kLeastSamples)
+      means.at(sign > 0.0 ? 1 : 0).push_back(sum / static_cast<double>(samples));
+    sum = 0.0;
+    samples = 0;
+  };
+  for (std::size_t i = 0; i < drift.residual.size(); ++i) {
+    const DriftResidual& at = drift.residual[i];
+    const bool is_new = i > 0 && at.record != drift.residual[i - 1].record;
+    if (std::abs(at.elastic) < kDeadBand * largest && !is_new) continue;
+    const double now = std::copysign(1.0, at.elastic);
+    if (now != sign || is_new) end_part();
+    sign = now;
+    sum += at.value;
+    ++samples;
+  }
+  end_part();
+  return means;
+}
+
 }  // namespace
 
 std::string_view name(JointTrait trait) noexcept {
@@ -108,6 +154,7 @@ std::string_view name(JointTrait trait) noexcept {
     case JointTrait::backlash: return "backlash";
     case JointTrait::encoder_error: return "encoder error";
     case JointTrait::loose_sensor: return "loose sensor";
+    case JointTrait::asymmetry: return "asymmetry";
     case JointTrait::noise: break;
   }
   return "noise";
@@ -135,51 +182,39 @@ PeriodicError periodic_error(const Drift& drift, const Dataset& dataset) {
 }
 
 double zero_wander(const Drift& drift) {
-  constexpr double kDeadBand = 0.05;  // share of the largest elastic torque
   constexpr std::size_t kLeastChanges = 4;
-  double largest = 0.0;
-  for (const DriftResidual& at : drift.residual) largest = std::max(largest, std::abs(at.elastic));
-  std::vector<double> means;
-  double sum = 0.0;
-  std::size_t samples = 0;
-  double sign = 0.0;
-  const auto end_part = [&] {
-    constexpr std::size_t kLeastSamples = 10;
-    if (samples >= kLeastSamples) means.push_back(sum / static_cast<double>(samples));
-    sum = 0.0;
-    samples = 0;
-  };
-  for (std::size_t i = 0; i < drift.residual.size(); ++i) {
-    const DriftResidual& at = drift.residual[i];
-    const bool is_new = i > 0 && at.record != drift.residual[i - 1].record;
-    if (std::abs(at.elastic) < kDeadBand * largest && !is_new) continue;
-    const double now = std::copysign(1.0, at.elastic);
-    if (now != sign || is_new) end_part();
-    sign = now;
-    sum += at.value;
-    ++samples;
+  constexpr double kKept = 0.8;
+  std::vector<double> distances;
+  for (std::vector<double>& means : means_by_sign(drift)) {
+    const double median = quantile(means, 0.5);
+    for (const double mean : means) distances.push_back(std::abs(mean - median));
   }
-  end_part();
-  if (means.size() < kLeastChanges) return kNotMeasured;
-  double mean = 0.0;
-  for (const double each : means) mean += each / static_cast<double>(means.size());
+  if (distances.size() < kLeastChanges) return kNotMeasured;
+  std::ranges::sort(distances);
+  distances.resize(
+      static_cast<std::size_t>(std::ceil(kKept * static_cast<double>(distances.size()))));
   double squares = 0.0;
-  for (const double each : means) squares += (each - mean) * (each - mean);
-  return std::sqrt(squares / static_cast<double>(means.size() - 1));
+  for (const double distance : distances) squares += distance * distance;
+  return std::sqrt(squares / static_cast<double>(distances.size()));
 }
 
 JointTraits joint_traits(const ModelFile& base, const Dataset& dataset, const Progress& progress) {
   DriftOptions options;
   options.with_residual = true;
-  const Drift drift = detect_drift(base, dataset, options, progress);
+  const Drift drift = joint_difference(base, dataset, options, progress);
   JointTraits traits;
   traits.rmse = drift.rmse;
+  JointTraits::Value friction;
+  JointTraits::Value break_away;
   for (const DriftQuantity& of : drift.quantities) {
     if (of.name == drift_names::kScale) traits[JointTrait::stiffness] = relative(of);
-    if (of.name == drift_names::kFriction) traits[JointTrait::friction] = relative(of);
+    if (of.name == drift_names::kAsymmetry) traits[JointTrait::asymmetry] = relative(of);
+    if (of.name == drift_names::kFriction) friction = relative(of);
+    if (of.name == drift_names::kBreakAway) break_away = relative(of);
     if (of.name == drift_names::kZero) traits[JointTrait::zero] = absolute(of);
     if (of.name == "backlash") traits[JointTrait::backlash] = absolute(of);
   }
+  traits[JointTrait::friction] = friction_work(friction, break_away);
   const std::string unit = unit_label(base.settings.target);
   const PeriodicError periodic = periodic_error(drift, dataset);
   traits[JointTrait::encoder_error] = {

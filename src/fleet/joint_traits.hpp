@@ -15,7 +15,7 @@
 namespace torsio {
 
 /// The traits of a joint in all recordings of the dataset, whose role is test, against the model of its family.
-/// @throws Error as `detect_drift`.
+/// @throws Error as `joint_difference`.
 [[nodiscard]] JointTraits joint_traits(const ModelFile& base, const Dataset& dataset,
                                        const Progress& progress = {});
 
@@ -34,8 +34,10 @@ struct PeriodicError {
 /// for each angle channel in rad and N = 1 to 64 with 1.25 periods or more in the motion.
 [[nodiscard]] PeriodicError periodic_error(const Drift& drift, const Dataset& dataset);
 
-/// Standard deviation of the mean residual between two changes of the sign of the load, in the target's unit: a load
-/// cell that is loose comes to rest in another place each time. NaN with fewer than four changes.
+/// Wander of the mean residual from one change of the load's sign to the next, in the target's unit: a load cell that
+/// is loose comes to rest in another place each time. It is the root mean square distance from the median of the means
+/// with the same sign, without the fifth that is furthest from it: a model may be wrong in a few of the motions. NaN
+/// with fewer than four means.
 [[nodiscard]] double zero_wander(const Drift& drift);
 
 }  // namespace torsio

@@ -69,10 +69,12 @@ class ParetoTail : public Tail {
     double scale = 1.0;
   };
 
-  /// The parameters within the likelihood region of 95 %, on a grid.
+  /// The parameters within the likelihood region of 90 %, on a grid.
   void find_likely_tails(const std::vector<double>& excess, std::size_t censored) {
-    constexpr int kShapes = 21;
-    constexpr double kLowestShape = -1.0;  // a uniform distribution
+    constexpr int kShapes = 11;
+    // A density that falls linearly to its end: that of parts within a tolerance whose estimates are noisy. Below it the
+    // region of the likelihood does not hold either (Smith 1985).
+    constexpr double kLowestShape = -0.5;
     constexpr double kHighestShape = 0.0;  // an exponential one
     constexpr int kScales = 97;
     constexpr double kScaleRange = 8.0;
@@ -94,7 +96,7 @@ class ParetoTail : public Tail {
       }
     const double best =
         std::ranges::max_element(all, {}, [](const auto& each) { return each.first; })->first;
-    constexpr double kRegion = 2.996;  // half of the 95 % quantile of chi^2 with two parameters
+    constexpr double kRegion = 2.303;  // half of the 90 % quantile of chi^2 with two parameters
     for (const auto& [value, tail] : all)
       if (value >= best - kRegion) likely_.push_back(tail);
   }

@@ -18,7 +18,7 @@ inline constexpr std::size_t kLeastMembers = 8;
 /// One member of a population.
 struct OutlierScore {
   double distance = kNotMeasured;  ///< from the median, in the value's unit
-  /// Upper 95 % bound of the probability that a sound member lies at least so far from the median on
+  /// Upper 90 % bound of the probability that a sound member lies at least so far from the median on
   /// this side.
   double probability = kNotMeasured;
   double expected = kNotMeasured;  ///< that probability times the number of members
@@ -52,10 +52,11 @@ struct OutlierOptions {
 ///     P(X > u + y) = 0.25 (1 + xi y / sigma)^(-1 / xi)
 ///
 /// fitted by maximum likelihood to the values up to the quantile at 98.5 %, those beyond being censored,
-/// and again without the outliers that it shows; xi is between -1 (a uniform distribution) and 0 (an
-/// exponential one). The probability is the largest within the likelihood region of 95 %. A population
-/// with bounds (xi < 0), as one of parts within tolerances, thus has narrow limits, one with long tails
-/// wide ones. With fewer values, from 8 on, the distance over 1.4826 times the median absolute deviation
+/// and again without the outliers that it shows; xi is between -1/2 (a density that falls linearly to its
+/// end) and 0 (an exponential one). The probability is the largest within the likelihood region of 90 %. A
+/// population with bounds (xi < 0), as one of parts within tolerances, thus has narrow limits, one with long
+/// tails wide ones. Even a uniform one is given an end beyond its own, since noise rounds it where the
+/// censored values are. With fewer values, from 8 on, the distance over 1.4826 times the median absolute deviation
 /// is taken as Student's t with a third of n - 1 degrees of freedom, since this deviation has the
 /// efficiency 0.37. With fewer than 8 no member is an outlier.
 [[nodiscard]] OutlierTest find_outliers(std::span<const double> values,

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "evaluate/fit_and_score.hpp"
+#include "evaluate/model_entry.hpp"
 #include "search/scored_model_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
@@ -58,6 +59,7 @@ SpecimenStudy::SpecimenStudy(SpecimenRequest request) : request_(std::move(reque
                       .expected = "one model, with its settings or without: each specimen gets one",
                       .found = '"' + model + '"',
                       .advice = "Run one study for each model."});
+  check_model_entry(model);
 }
 
 std::vector<Trial> SpecimenStudy::first_trials() const {

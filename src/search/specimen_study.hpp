@@ -34,7 +34,7 @@ inline constexpr std::string_view kSpecimenStudy = "specimens";
 /// its RMSE on the second is the value.
 class SpecimenStudy : public StudyKind {
  public:
-  /// @throws UsageError if `request.model` is several models.
+  /// @throws UsageError if `request.model` is several models, or has a family or setting that does not exist.
   explicit SpecimenStudy(SpecimenRequest request);
 
   [[nodiscard]] std::vector<Trial> first_trials() const;

@@ -72,6 +72,13 @@ TEST(CalibrationTextTest, AJointIsReadAsItWasWritten) {
   EXPECT_TRUE(std::isnan(read.traits[JointTrait::noise].value));
   EXPECT_TRUE(std::isnan(read.methods.front().held_out_rmse));
   EXPECT_EQ(joint_text(read), joint_text(joint));
+  // A result of an earlier version.
+  std::string without = joint_text(joint);
+  const std::size_t begin = without.find("\"asymmetry\"");
+  ASSERT_NE(begin, std::string::npos);
+  without.erase(begin, without.find('}', begin) + 2 - begin);
+  EXPECT_TRUE(std::isnan(joint_from_text(without).traits[JointTrait::asymmetry].value));
+  EXPECT_EQ(joint_from_text(without).traits[JointTrait::zero].value, -0.2);
   EXPECT_THROW(static_cast<void>(joint_from_text("{")), Error);
   FileHashes sha256;
   EXPECT_THROW(static_cast<void>(task_from_text("[]", sha256)), Error);
@@ -144,6 +151,12 @@ TEST(JointTraitsTest, AZeroThatMovesWithTheSignOfTheLoadIsWander) {
   const ResidualExample sound([](std::size_t, double) { return 0.0; });
   EXPECT_GT(zero_wander(loose.drift), 0.3);
   EXPECT_LT(zero_wander(sound.drift), 0.01);
+  // A model that is wrong in one motion, or in all with one sign of the load.
+  const ResidualExample wrong_once(
+      [](std::size_t n, double) { return 0.004 * static_cast<double>(n) < std::numbers::pi; });
+  EXPECT_LT(zero_wander(wrong_once.drift), 0.01);
+  const ResidualExample asymmetric([](std::size_t, double angle_rad) { return angle_rad > 0.0; });
+  EXPECT_LT(zero_wander(asymmetric.drift), 0.01);
   Drift still;
   EXPECT_TRUE(std::isnan(zero_wander(still)));
 }
@@ -156,6 +169,7 @@ FleetCalibration fleet_with(const std::map<std::size_t, JointTrait>& faults) {
     CalibratedJoint joint{.serial = "J" + std::to_string(i), .type = "knee", .chosen = "own fit"};
     joint.traits.rmse = 0.1;
     joint.traits[JointTrait::stiffness].value = random.uniform(-0.03, 0.03);
+    joint.traits[JointTrait::asymmetry].value = random.uniform(-0.03, 0.03);
     joint.traits[JointTrait::friction].value = random.uniform(-0.25, 0.25);
     joint.traits[JointTrait::zero] = {.value = 0.1 * random.normal(), .unit = "Nm"};
     joint.traits[JointTrait::backlash] = {.value = 1e-4 * random.normal(), .unit = "rad"};
@@ -181,13 +195,14 @@ FleetCalibration fleet_with(const std::map<std::size_t, JointTrait>& faults) {
 TEST(FleetOutliersTest, EachKindIsNamed) {
   const std::map<std::size_t, JointTrait> faults{
       {4, JointTrait::stiffness},       {50, JointTrait::friction},      {99, JointTrait::zero},
-      {180, JointTrait::encoder_error}, {240, JointTrait::loose_sensor}, {270, JointTrait::noise}};
+      {180, JointTrait::encoder_error}, {240, JointTrait::loose_sensor}, {270, JointTrait::noise},
+      {290, JointTrait::asymmetry}};
   const FleetCalibration fleet = fleet_with(faults);
   std::map<std::size_t, JointTrait> found;
   for (const FleetOutlier& outlier : fleet.outliers) found[outlier.joint] = outlier.trait;
   EXPECT_EQ(found, faults);
   EXPECT_THAT(fleet_text(fleet),
-              HasSubstr("300 joints: 300 with a model, 0 without; 6 differ from the others of "
+              HasSubstr("300 joints: 300 with a model, 0 without; 7 differ from the others of "
                         "their type"));
 }
 
@@ -238,6 +253,8 @@ TEST(FleetListTest, AFamilyThatDoesNotExistIsRefusedBeforeTheStudyBegins) {
   FleetChoice choice = specimens("dfki-50#0001..#0002");
   choice.model = "greybox";
   EXPECT_THAT(refusal_of(choice), testing::AllOf(HasSubstr("greybox"), HasSubstr("grey_box")));
+  choice.model = "mlp:epoch=2";
+  EXPECT_THAT(refusal_of(choice), HasSubstr("epoch"));
   choice.model = "mlp:epochs=2";
   EXPECT_EQ(calibration_request(choice).model, "mlp:epochs=2");
 }

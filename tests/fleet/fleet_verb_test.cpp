@@ -63,7 +63,21 @@ TEST_F(FleetVerb, AJointWithoutAModelIsAnErrorAfterTheResults) {
   EXPECT_THAT(outcome.out, HasSubstr("3 joints: 2 with a model, 1 without"));
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("nothing is kept if this is stopped"),
                                  HasSubstr("three.yaml: 1 of 3 joints has no model")));
-  EXPECT_THAT(contents("pages/index.html"), HasSubstr("2 with a model, 1 without"));
+  EXPECT_THAT(contents("pages/index.html"),
+              AllOf(HasSubstr("2 with a model, 1 without"),
+                    HasSubstr(R"(<td><a href="J03.html">J03</a></td>)"),
+                    HasSubstr(R"(<td><a href="J05.html">J05</a></td>)")));
+  EXPECT_THAT(contents("pages/J03.html"), HasSubstr("<h1>Joint J03</h1>"));
+}
+
+TEST_F(FleetVerb, OutputsThatCannotBeWrittenAreRefusedBeforeTheWork) {
+  folder_.file("pages", "not a folder");
+  for (const char* output : {"--report pages", "--report one.yaml/pages", "--json absent/r.json"}) {
+    const Outcome outcome = torsio(
+        std::string("fleet calibrate two.yaml --model linear --store absent.sqlite ") + output);
+    EXPECT_NE(outcome.exit_code, 0) << output;
+    EXPECT_NE(shell("ls absent.sqlite").exit_code, 0) << output << ": the study has begun";
+  }
 }
 
 TEST_F(FleetVerb, AFamilyThatDoesNotExistLeavesTheStoreAsItWas) {
@@ -71,6 +85,23 @@ TEST_F(FleetVerb, AFamilyThatDoesNotExistLeavesTheStoreAsItWas) {
       torsio("fleet calibrate two.yaml --model greybox --store absent.sqlite --promote");
   EXPECT_EQ(outcome.exit_code, kCallWasWrong);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("greybox"), HasSubstr("Did you mean 'grey_box'?")));
+  EXPECT_NE(shell("ls absent.sqlite").exit_code, 0) << "it was created";
+}
+
+TEST_F(FleetVerb, ASettingThatDoesNotExistIsRefusedOnce) {
+  const Outcome outcome =
+      torsio("fleet calibrate two.yaml --model polynomial:degre=3 --store absent.sqlite");
+  EXPECT_EQ(outcome.exit_code, kCallWasWrong);
+  EXPECT_THAT(outcome.err, HasSubstr("degre"));
+  EXPECT_NE(shell("ls absent.sqlite").exit_code, 0) << "it was created";
+}
+
+TEST_F(FleetVerb, ASearchOfSpecimensRefusesAFamilyThatDoesNotExistBeforeItsTrials) {
+  const Outcome outcome = torsio(
+      "search --specimens 'dfki-50#0001..#0002' --models greybox --study s --store "
+      "absent.sqlite");
+  EXPECT_EQ(outcome.exit_code, kCallWasWrong);
+  EXPECT_THAT(outcome.err, HasSubstr("Did you mean 'grey_box'?"));
   EXPECT_NE(shell("ls absent.sqlite").exit_code, 0) << "it was created";
 }
 

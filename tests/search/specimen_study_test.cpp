@@ -29,7 +29,9 @@ TEST(SpecimenStudy, RefusesSeveralModels) {
     EXPECT_THAT(test::error_message([&] { SpecimenStudy({.model = several}); }),
                 HasSubstr("--models: expected one model"))
         << several;
-  EXPECT_NO_THROW(SpecimenStudy({.model = "mlp:layers=16-16:window=20"}));
+  EXPECT_THAT(test::error_message([&] { SpecimenStudy({.model = "greybox"}); }),
+              HasSubstr("grey_box"));
+  EXPECT_NO_THROW(SpecimenStudy({.model = "mlp:layers=16-16:epochs=20"}));
 }
 
 std::vector<double> values_of(const SpecimenRequest& request, std::size_t threads) {

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "common/output.hpp"
+#include "report/html/linked_report.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
@@ -101,6 +102,6 @@ void ReportOutput::write(torsio::ReportDocument document) const {
                                           torsio::kJsonSchemaVersion)}};
   std::ranges::move(document.origin, std::back_inserter(origin));
   document.origin = std::move(origin);
-  write_text(destination, torsio::report_html(document));
+  write_text(destination, torsio::linked_report_html(document, pages));
   remark("report written to " + destination);
 }

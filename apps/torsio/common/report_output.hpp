@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@ struct ReportOutput {
   std::string plot_size = {};
   std::vector<std::string> plot_figures = {};
   std::string preferred_figure = {};  ///< a word of its title
+  /// Files beside the page, by the text of the first cell of a row that is a link to it.
+  std::map<std::string, std::string> pages = {};
 
   void add_page(CLI::App& verb);  ///< without --plot
   /// @param preferred is `preferred_figure`

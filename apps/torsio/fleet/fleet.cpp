@@ -49,18 +49,24 @@ torsio::StoreAddress address_of(const CalibrateFlags& flags) {
   return torsio::store_address((folder / "torsio-studies.sqlite").string());
 }
 
-/// The page of all joints and one for each.
+constexpr const char* kIndex = "index.html";
+
+std::string path_in(const std::string& folder, const std::string& file) {
+  return (std::filesystem::path(folder) / file).string();
+}
+
+/// The page of all joints and one for each, to which it leads.
 void write_pages(const std::string& folder, const torsio::FleetCalibration& fleet) {
-  make_folder(folder);
-  const auto path_of = [&](std::string file) {
-    std::ranges::replace(file, '/', '_');
-    return (std::filesystem::path(folder) / file).string();
-  };
   ReportOutput all;
-  all.destination = path_of("index.html");
+  all.destination = path_in(folder, kIndex);
+  for (const torsio::CalibratedJoint& joint : fleet.joints) {
+    std::string file = joint.serial + ".html";
+    std::ranges::replace(file, '/', '_');
+    all.pages[joint.serial] = std::move(file);
+  }
   all.write(torsio::fleet_report(fleet));
   for (std::size_t i = 0; i < fleet.joints.size(); ++i)
-    write_text(path_of(fleet.joints[i].serial + ".html"),
+    write_text(path_in(folder, all.pages.at(fleet.joints[i].serial)),
                torsio::report_html(torsio::fleet_joint_report(fleet, i)));
   remark(fmt::format("a page for each of {} joints written to {}", fleet.joints.size(), folder));
 }
@@ -116,6 +122,12 @@ void calibrate(CalibrateFlags& flags) {
     throw torsio::UsageError({.place = "--promote",
                               .problem = "models are made current in a store",
                               .advice = "Add --store FILE.sqlite."});
+  // The work may take hours.
+  DataFlags().check_outputs({flags.json.destination});
+  if (!flags.pages.empty()) {
+    make_folder(flags.pages);
+    require_writable(path_in(flags.pages, kIndex));
+  }
   torsio::CalibrationStudy kind(request);
   torsio::StudyStore store(address_of(flags), wait_for_server);
   const std::string name = flags.worker.study.empty() ? "calibrate" : flags.worker.study;

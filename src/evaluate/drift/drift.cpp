@@ -14,6 +14,7 @@
 #include "evaluate/drift/compared_run.hpp"
 #include "evaluate/drift/direction_fit.hpp"
 #include "evaluate/drift/drive_friction.hpp"
+#include "evaluate/drift/joint_difference.hpp"
 #include "evaluate/drift/torque_parts.hpp"
 #include "evaluate/drift/verdicts.hpp"
 #include "torsio/check/check.hpp"
@@ -57,6 +58,16 @@ double calibration_rmse(const ModelFile& model) {
   return errors.empty() ? kNotMeasured : root_mean_square(errors);
 }
 
+/// Directions besides zero, scale, friction and backlash.
+struct FurtherDirections {
+  bool has_widening = false;
+  bool has_asymmetry = false;
+
+  [[nodiscard]] std::size_t count() const noexcept {
+    return (has_widening ? 1U : 0U) + (has_asymmetry ? 1U : 0U);
+  }
+};
+
 /// The comparison of all recordings.
 class Comparison {
  public:
@@ -87,26 +98,52 @@ class Comparison {
   }
 
   [[nodiscard]] Drift drift() {
-    Drift drift;
-    drift.calibration_rmse = calibration_rmse(model_);
-    collect(drift);
-    DirectionFit fit = fit_of_directions(/*with_widening=*/false);
+    Drift drift = errors();
+    DirectionFit fit = fit_of_directions({});
     // Friction that has changed much may have other break-away angles, too.
-    if (has_much_other_friction(fit)) fit = fit_of_directions(/*with_widening=*/true);
-    drift.samples = residual_.size();
-    drift.effective_samples = fit.effective_samples;
-    drift.corrected_rmse = fit.residual_rms();
-    const LastingError model_error = fit.lasting_error(noise_lag(runs_.front()));
-    drift.quantities = {zero(fit, model_error), scale(fit, model_error), friction(fit, model_error),
-                        backlash(fit, model_error)};
+    if (has_much_other_friction(fit)) fit = fit_of_directions({.has_widening = true});
+    describe(fit, drift);
     conclude(drift);
-    if (options_.with_residual) list_residual(fit, drift);
+    return drift;
+  }
+
+  [[nodiscard]] Drift difference() {
+    Drift drift = errors();
+    const DirectionFit fit = fit_of_directions({.has_widening = true, .has_asymmetry = true});
+    describe(fit, drift);
+    const LastingError model_error = fit.lasting_error(noise_lag(runs_.front()));
+    drift.quantities.push_back(
+        further_quantity(drift_names::kAsymmetry, fit, kAsymmetry, model_error, kSmallestScale));
+    drift.quantities.push_back(
+        further_quantity(drift_names::kBreakAway, fit, kWidening, model_error, kSmallestFriction));
+    conclude(drift);
     return drift;
   }
 
   [[nodiscard]] const std::vector<ComparedRun>& runs() const noexcept { return runs_; }
 
  private:
+  static constexpr std::size_t kWidening = 4;
+  static constexpr std::size_t kAsymmetry = 5;  // with the widening
+
+  [[nodiscard]] Drift errors() {
+    Drift drift;
+    drift.calibration_rmse = calibration_rmse(model_);
+    collect(drift);
+    return drift;
+  }
+
+  /// What remains, and the four quantities.
+  void describe(const DirectionFit& fit, Drift& drift) const {
+    drift.samples = residual_.size();
+    drift.effective_samples = fit.effective_samples;
+    drift.corrected_rmse = fit.residual_rms();
+    const LastingError model_error = fit.lasting_error(noise_lag(runs_.front()));
+    drift.quantities = {zero(fit, model_error), scale(fit, model_error), friction(fit, model_error),
+                        backlash(fit, model_error)};
+    if (options_.with_residual) list_residual(fit, drift);
+  }
+
   [[nodiscard]] double half() const { return 0.5 * (highest_ - lowest_); }
 
   /// Whether the torque falls with x, as where the deflection is counted the other way.
@@ -184,8 +221,8 @@ class Comparison {
       }
   }
 
-  [[nodiscard]] DirectionFit fit_of_directions(bool with_widening) const {
-    return fit_directions(columns(with_widening), residual_, options_.resamples, options_.seed);
+  [[nodiscard]] DirectionFit fit_of_directions(const FurtherDirections& further) const {
+    return fit_directions(columns(further), residual_, options_.resamples, options_.seed);
   }
 
   [[nodiscard]] bool has_much_other_friction(const DirectionFit& fit) const {
@@ -193,9 +230,9 @@ class Comparison {
     return of.verdict == DriftVerdict::changed && std::abs(of.relative) > kSmallestFriction;
   }
 
-  [[nodiscard]] Matrix columns(bool with_widening) const {
+  [[nodiscard]] Matrix columns(const FurtherDirections& further) const {
     const std::size_t inputs = runs_.front().features.columns;
-    const std::size_t own = with_widening ? 5 : 4;
+    const std::size_t own = 4 + further.count();
     Matrix columns(residual_.size(), own + inputs - 1);
     std::size_t row = 0;
     for (const ComparedRun& run : runs_)
@@ -207,7 +244,8 @@ class Comparison {
           columns(row, 3) =
               -parts_.stiffness[row] *
               std::clamp((run.x[n] - parts_.middle) / (kPlayWidth * half()), -1.0, 1.0);
-        if (with_widening) columns(row, 4) = parts_.widening[row];
+        if (further.has_widening) columns(row, kWidening) = parts_.widening[row];
+        if (further.has_asymmetry) columns(row, kAsymmetry) = std::abs(parts_.elastic[row]);
         for (std::size_t j = 1; j < inputs; ++j) columns(row, own + j - 1) = run.features(n, j);
         ++row;
       }
@@ -261,6 +299,16 @@ class Comparison {
     return result;
   }
 
+  /// @param smallest the smallest that counts; two fifths of it are tolerated, as of the scale and the friction
+  [[nodiscard]] static DriftQuantity further_quantity(const char* of, const DirectionFit& fit,
+                                                      std::size_t column,
+                                                      const LastingError& model_error,
+                                                      double smallest) {
+    constexpr double kTolerated = 0.4;
+    return direction_quantity(of, {}, 1.0, fit, column, model_error, kTolerated * smallest,
+                              smallest);
+  }
+
   const ModelFile& model_;
   const DriftOptions& options_;
   std::vector<ComparedRun> runs_;
@@ -272,6 +320,27 @@ class Comparison {
   TorqueParts parts_;
   std::vector<double> residual_;
 };
+
+void check_comparison(const ModelFile& model, const Dataset& dataset, const DriftOptions& options) {
+  constexpr std::size_t kLeastResamples = 100;
+  if (options.resamples < kLeastResamples)
+    throw UsageError({.place = "resamples",
+                      .expected = fmt::format("at least {}", kLeastResamples),
+                      .found = fmt::format("{}", options.resamples)});
+  for (const DatasetRecord& record : dataset.records) {
+    require_length(record.recording);
+    const std::string mistake = unit_doubt(record.recording, model.settings);
+    if (!mistake.empty())
+      throw Error(
+          {.place = record.recording.name(),
+           .problem =
+               fmt::format("{} over {} differs from the training by the factor between {}",
+                           model.settings.target, model.settings.features.inputs.front(), mistake),
+           .expected = "the units of the training data",
+           .found = mistake,
+           .advice = "Check the units of the recording, or give the mapping of the training."});
+  }
+}
 
 }  // namespace
 
@@ -299,24 +368,7 @@ std::string_view name(DriftAdvice advice) noexcept {
 
 Drift detect_drift(const ModelFile& model, const Dataset& dataset, const DriftOptions& options,
                    const Progress& progress) {
-  constexpr std::size_t kLeastResamples = 100;
-  if (options.resamples < kLeastResamples)
-    throw UsageError({.place = "resamples",
-                      .expected = fmt::format("at least {}", kLeastResamples),
-                      .found = fmt::format("{}", options.resamples)});
-  for (const DatasetRecord& record : dataset.records) {
-    require_length(record.recording);
-    const std::string mistake = unit_doubt(record.recording, model.settings);
-    if (!mistake.empty())
-      throw Error(
-          {.place = record.recording.name(),
-           .problem =
-               fmt::format("{} over {} differs from the training by the factor between {}",
-                           model.settings.target, model.settings.features.inputs.front(), mistake),
-           .expected = "the units of the training data",
-           .found = mistake,
-           .advice = "Check the units of the recording, or give the mapping of the training."});
-  }
+  check_comparison(model, dataset, options);
   Drift drift = Comparison(model, dataset, options, progress).drift();
   if (options.reference != nullptr) {
     if (options.reference->settings.target != model.settings.target)
@@ -337,6 +389,12 @@ Drift detect_drift(const ModelFile& model, const Dataset& dataset, const DriftOp
     }
   }
   return drift;
+}
+
+Drift joint_difference(const ModelFile& model, const Dataset& dataset, const DriftOptions& options,
+                       const Progress& progress) {
+  check_comparison(model, dataset, options);
+  return Comparison(model, dataset, options, progress).difference();
 }
 
 }  // namespace torsio

@@ -14,6 +14,8 @@ inline constexpr const char* kScale = "stiffness or gain";
 inline constexpr const char* kStiffness = "stiffness";
 inline constexpr const char* kGain = "gain of the torque sensor";
 inline constexpr const char* kFriction = "friction";
+inline constexpr const char* kAsymmetry = "asymmetry";
+inline constexpr const char* kBreakAway = "break-away angles";
 inline constexpr const char* kDriveFriction = "friction of the drive";
 }  // namespace drift_names
 

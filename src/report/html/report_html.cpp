@@ -6,6 +6,7 @@
 #include <string_view>
 #include <variant>
 
+#include "report/html/linked_report.hpp"
 #include "report/html/page_data.hpp"
 #include "report/html/page_files.hpp"
 #include "report/markup_text.hpp"
@@ -20,15 +21,38 @@ std::string paragraph(const std::string& text) {
   return text.empty() ? std::string() : fmt::format("<p>{}</p>\n", markup_text(text));
 }
 
-std::string cells_html(const std::vector<std::string>& cells) {
+/// The name of a file as a part of an address.
+std::string address_text(std::string_view file) {
+  std::string text;
+  for (const char letter : file) {
+    const bool is_plain = (letter >= '0' && letter <= '9') || (letter >= 'A' && letter <= 'Z') ||
+                          (letter >= 'a' && letter <= 'z') || letter == '-' || letter == '_' ||
+                          letter == '.';
+    if (is_plain)
+      text += letter;
+    else
+      text += fmt::format("%{:02X}", static_cast<unsigned>(static_cast<unsigned char>(letter)));
+  }
+  return text;
+}
+
+/// File of a page, by the text of the cell that leads to it.
+using Pages = std::map<std::string, std::string>;
+
+std::string cells_html(const std::vector<std::string>& cells, const Pages& pages) {
   std::string html;
-  for (const std::string& cell : cells) html += fmt::format("<td>{}</td>", markup_text(cell));
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    std::string text = markup_text(cells[i]);
+    if (const auto page = i == 0 ? pages.find(cells[i]) : pages.end(); page != pages.end())
+      text = fmt::format(R"(<a href="{}">{}</a>)", address_text(page->second), text);
+    html += fmt::format("<td>{}</td>", text);
+  }
   return html;
 }
 
 /// Each row is a body of its own, so that its details move with it when the table is sorted.
 /// @param label unique in the page, as a region must have a name of its own
-std::string table_html(const ReportTable& table, const std::string& label) {
+std::string table_html(const ReportTable& table, const std::string& label, const Pages& pages) {
   std::string html =
       table.title.empty() ? "" : fmt::format("<h3>{}</h3>\n", markup_text(table.title));
   html += fmt::format(
@@ -39,7 +63,7 @@ std::string table_html(const ReportTable& table, const std::string& label) {
     html += fmt::format("<th scope=\"col\">{}</th>", markup_text(heading));
   html += "</tr></thead>\n";
   for (const ReportTable::Row& row : table.rows) {
-    html += "<tbody><tr>" + cells_html(row.cells) + "</tr>";
+    html += "<tbody><tr>" + cells_html(row.cells, pages) + "</tr>";
     if (!row.details.empty())
       html += fmt::format(R"(<tr><td class="details" colspan="{}">{}</td></tr>)",
                           table.headings.size(), markup_text(row.details));
@@ -65,7 +89,7 @@ bool has_line(const ReportFigure& figure) {
 
 class Page {
  public:
-  explicit Page(const ReportDocument& document) : document_(document) {}
+  Page(const ReportDocument& document, const Pages& pages) : document_(document), pages_(pages) {}
 
   std::string html() {
     std::string body;
@@ -97,7 +121,8 @@ class Page {
     std::string html = fmt::format("<section>\n<h2>{}</h2>\n", markup_text(section.heading));
     html += paragraph(section.text);
     for (const ReportTable& table : section.tables)
-      html += table_html(table, unique_label(table.title.empty() ? section.heading : table.title));
+      html += table_html(table, unique_label(table.title.empty() ? section.heading : table.title),
+                         pages_);
     for (const ReportFigure& figure : section.figures) html += figure_html(figure);
     if (!section.preformatted.empty())
       html += fmt::format(
@@ -132,10 +157,11 @@ class Page {
     ReportTable table{.title = {}, .headings = {"what", "value"}, .rows = {}, .is_words = true};
     for (const auto& [what, value] : document_.origin) table.rows.push_back({{what, value}});
     return fmt::format("<section>\n<h2>How this was made</h2>\n{}</section>\n",
-                       table_html(table, unique_label("How this was made")));
+                       table_html(table, unique_label("How this was made"), {}));
   }
 
   const ReportDocument& document_;
+  const Pages& pages_;
   std::vector<const ReportFigure*> figures_;
   std::map<std::string, std::size_t> labels_;
   bool has_picture_ = false;
@@ -143,6 +169,11 @@ class Page {
 
 }  // namespace
 
-std::string report_html(const ReportDocument& document) { return Page(document).html(); }
+std::string report_html(const ReportDocument& document) { return linked_report_html(document, {}); }
+
+std::string linked_report_html(const ReportDocument& document,
+                               const std::map<std::string, std::string>& pages) {
+  return Page(document, pages).html();
+}
 
 }  // namespace torsio

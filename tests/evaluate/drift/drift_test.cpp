@@ -6,8 +6,10 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <variant>
 
 #include "actuator/stage_wear.hpp"
+#include "evaluate/drift/joint_difference.hpp"
 #include "report/drift.hpp"
 #include "sim/campaign/drift_campaign.hpp"
 #include "support/error_message.hpp"
@@ -133,6 +135,32 @@ TEST(Drift, FindsAChangeOfTheFriction) {
   EXPECT_EQ(of(drift, "friction").verdict, DriftVerdict::changed);
   EXPECT_NEAR(of(drift, "friction").relative, 0.3, 0.05);
   EXPECT_EQ(of(drift, "stiffness or gain").verdict, DriftVerdict::not_changed);
+}
+
+DataSheet with_asymmetry(double more) {
+  DataSheet sheet = data_sheet(kActuator);
+  SheetValue& asymmetry = std::get<SpringSheet>(sheet.second).asymmetry;
+  asymmetry = assumed(asymmetry.value + more);
+  return sheet;
+}
+
+// Sound joints of a type differ in it, which `detect_drift` takes for stiffness and zero.
+TEST(JointDifference, AsymmetryIsNotTakenForStiffness) {
+  const Drift drift = joint_difference(model(), today(with_asymmetry(0.03)));
+  EXPECT_NEAR(of(drift, "asymmetry").relative, 0.03, 0.006);
+  EXPECT_NEAR(of(drift, "stiffness or gain").relative, 0.0, 0.006);
+  EXPECT_LT(std::abs(of(drift, "zero").change), 0.1);
+  const Drift same = joint_difference(model(), today(data_sheet(kActuator)));
+  EXPECT_EQ(of(same, "asymmetry").verdict, DriftVerdict::not_changed);
+  EXPECT_LT(std::abs(of(same, "break-away angles").relative), 0.15);
+}
+
+TEST(JointDifference, FrictionWithWiderBreakAwayAnglesIsFound) {
+  const Drift drift =
+      joint_difference(model(), today(worn(data_sheet(kActuator), {.friction = 1.5})));
+  EXPECT_NEAR(of(drift, "friction").relative, 0.5, 0.06);
+  EXPECT_GT(of(drift, "break-away angles").relative, 0.3);
+  EXPECT_NEAR(of(drift, "stiffness or gain").relative, 0.0, 0.012);
 }
 
 /// Sweeps of today with white noise of the load cell in addition.

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "report/html/linked_report.hpp"
 #include "report/html/page_files.hpp"
 #include "torsio/report/document/report_document.hpp"
 
@@ -64,6 +65,15 @@ TEST(ReportHtml, HasTablesAndAPictureWithoutJavaScript) {
   const std::string page = report_html(example("model"));
   EXPECT_NE(page.find("<td>model</td>"), std::string::npos);
   EXPECT_NE(between(page, "<noscript>", "</noscript>").find("<img alt="), std::string::npos);
+}
+
+TEST(ReportHtml, FirstCellsLeadToOtherPages) {
+  const std::string page =
+      linked_report_html(example("knee#1 & 2"), {{"knee#1 & 2", "knee#1 & 2.html"}});
+  EXPECT_NE(page.find(R"(<td><a href="knee%231%20%26%202.html">knee#1 &amp; 2</a></td>)"),
+            std::string::npos);
+  EXPECT_EQ(linked_report_html(example("hip"), {{"knee", "knee.html"}}),
+            report_html(example("hip")));
 }
 
 TEST(ReportHtml, AsksForNoOtherFile) {
