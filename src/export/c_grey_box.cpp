@@ -1,6 +1,7 @@
 #include "export/c_grey_box.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,12 +13,59 @@
 #include <vector>
 
 #include "export/c_coefficients.hpp"
+#include "export/c_kernel.hpp"
 #include "export/c_networks.hpp"
 #include "export/c_statements.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
+
+/// Writes `real NAME_products(x)`: as `InputProducts`.
+void write_products(CText& c, const InputProducts::Parameters& p) {
+  const std::vector<std::size_t> used = p.used();
+  std::vector<std::string> inputs;
+  std::vector<double> centres;
+  std::vector<double> factors;
+  for (const std::size_t i : used) {
+    inputs.push_back(fmt::format("x[{}]", i));
+    centres.push_back(p.centres[i]);
+    factors.push_back(1.0 / p.scales[i]);
+  }
+  const bool is_cubic = p.degree == 3;
+  c.work(CWork::scaled, static_cast<double>(used.size()));
+  c.work(CWork::term, static_cast<double>(p.coefficients.size()));
+  c.local_reals(used.size());
+  c.add(
+      R"c(
+static @real @products(const @real *x) {
+  const @real used[$USED$] = {$INPUTS$};
+  const @real *c = $COEFFICIENTS$;
+  @real z[$USED$], value;
+  uint32_t i, j$ALSO_K$;
+  for (i = 0U; i < $USED$U; ++i) z[i] = (used[i] - $CENTRES$[i]) * $FACTORS$[i];
+  value = *c++;
+  for (i = 0U; i < $USED$U; ++i) {
+    @real of_first = *c++;
+    for (j = i; j < $USED$U; ++j) {
+      @real of_pair = *c++;
+$THIRD$      of_first += z[j] * of_pair;
+    }
+    value += z[i] * of_first;
+  }
+  return value;
+}
+)c",
+      {{"USED", fmt::format("{}", used.size())},
+       {"ALSO_K", is_cubic ? ", k" : ""},
+       {"THIRD", is_cubic ? fmt::format("      for (k = j; k < {}U; ++k) of_pair += *c++ * z[k];\n",
+                                        used.size())
+                          : std::string()},
+       {"INPUTS", fmt::format("{}", fmt::join(inputs, ", "))},
+       {"COEFFICIENTS", c.table("product_coefficients", p.coefficients)},
+       {"CENTRES", c.table("product_centres", centres)},
+       {"FACTORS", c.table("product_factors", factors)}});
+}
 
 class GreyBoxWriter {
  public:
@@ -222,15 +270,39 @@ $RESIDUAL$  return @plain(value);
                          coefficient(column, "left"), coefficient(column, "left + 1U"));
   }
 
+  /// How C calls the model of a residual at the inputs `y`.
+  struct ResidualCall {
+    std::string declaration = {};
+    std::string before = {};  ///< statements
+    std::string value;
+  };
+
+  ResidualCall write_residual_model() {
+    const GreyBoxResidual& learned = *box_.residual;
+    if (const auto* network = std::get_if<Mlp::Parameters>(&learned.model)) {
+      const std::size_t all = network->scaling.inputs.scale.size();
+      c_.local_floats(all);
+      write_dense(c_, "network", network->layers);
+      return {.declaration = fmt::format("  float in[{}];\n", all),
+              .before = standardised(c_, "input", network->scaling, "y", "in"),
+              .value = destandardised(c_, network->scaling, "@network(in)")};
+    }
+    if (const auto* products = std::get_if<InputProducts::Parameters>(&learned.model)) {
+      write_products(c_, *products);
+      return {.value = "@products(y)"};
+    }
+    if (const auto* process = std::get_if<ParametricGp::Parameters>(&learned.model)) {
+      write_gp_mean(c_, *process);
+      return {.value = "@mean(y)"};
+    }
+    throw UsageError({.place = "the model",
+                      .expected = "a grey_box without a mixture as its residual",
+                      .found = "a mixture as its residual",
+                      .advice = "Fit it again with --set residual=auto or residual=none."});
+  }
+
   void write_residual() {
     const GreyBoxResidual& learned = *box_.residual;
-    const auto* network = std::get_if<Mlp::Parameters>(&learned.model);
-    if (network == nullptr)
-      throw UsageError(
-          {.place = "the model",
-           .expected = "a grey_box without a residual, or with a network as its residual",
-           .found = "a mixture as its residual",
-           .advice = "Fit it again with --set residual=mlp or residual=none."});
     const std::size_t inputs = terms_.inputs();
     const std::size_t all = inputs + terms_.thresholds.size();
     std::vector<double> border;
@@ -238,16 +310,13 @@ $RESIDUAL$  return @plain(value);
       border.push_back(GreyBoxResidual::kBorder * (learned.highest[j] - learned.lowest[j]));
     c_.work(CWork::border, static_cast<double>(all));
     c_.local_reals(all);
-    c_.local_floats(all);
-    write_dense(c_, "network", network->layers);
-    const std::string standardise = standardised(c_, "input", network->scaling, "y", "in");
+    const ResidualCall call = write_residual_model();
     c_.add(
         R"c(
 /* A bounded correction, faded out where an input leaves what it was trained on. */
 static @real @residual(const @state *s, const @real *x) {
   @real y[$ALL$], share = (@real)1, correction;
-  float in[$ALL$];
-  uint32_t j;
+$DECLARATION$  uint32_t j;
   for (j = 0U; j < $INPUTS$U; ++j) y[j] = x[j];
 $SLIPS$  for (j = 0U; j < $ALL$U; ++j) {
     const @real below = $LOWEST$[j] - y[j], above = y[j] - $HIGHEST$[j];
@@ -256,7 +325,7 @@ $SLIPS$  for (j = 0U; j < $ALL$U; ++j) {
     if (!(left_by < $BORDER$[j])) return (@real)0;
     if ((@real)1 - left_by / $BORDER$[j] < share) share = (@real)1 - left_by / $BORDER$[j];
   }
-$STANDARDISE$  correction = $VALUE$;
+$BEFORE$  correction = $VALUE$;
   if (!(correction - correction == (@real)0)) return (@real)0;
   return share * @limited(correction, -$BOUND$, $BOUND$);
 }
@@ -270,8 +339,9 @@ $STANDARDISE$  correction = $VALUE$;
          {"LOWEST", c_.table("residual_lowest", learned.lowest)},
          {"HIGHEST", c_.table("residual_highest", learned.highest)},
          {"BORDER", c_.table("residual_border", border)},
-         {"STANDARDISE", standardise},
-         {"VALUE", destandardised(c_, network->scaling, "@network(in)")},
+         {"DECLARATION", call.declaration},
+         {"BEFORE", call.before},
+         {"VALUE", call.value},
          {"BOUND", c_.number(learned.bound)}});
   }
 

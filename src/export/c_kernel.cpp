@@ -119,26 +119,60 @@ Matrix root_of(const Matrix& explained) {
   return root;
 }
 
+/// Counts the work of so many covariances.
+void add_work(CText& c, const KernelExpression& kernel, double values, std::size_t inputs) {
+  std::size_t kernels = 0;
+  for (const KernelNode& node : kernel.nodes)
+    if (node.kind < static_cast<std::size_t>(KernelKind::sum)) ++kernels;
+  c.work(CWork::kernel_term, values * static_cast<double>(kernels * inputs));
+  c.work(CWork::kernel_value, values * static_cast<double>(kernels));
+  c.work(CWork::kernel, static_cast<double>(kernels));
+  for (const KernelNode& node : kernel.nodes) add_functions(c, node, values, inputs);
+}
+
+std::vector<double> input_factors(const NetworkScaling& scaling) {
+  std::vector<double> factors;
+  for (const double scale : scaling.inputs.scale) factors.push_back(1.0 / scale);
+  return factors;
+}
+
 }  // namespace
+
+void write_gp_mean(CText& c, const ParametricGp::Parameters& p) {
+  const std::size_t inputs = p.inducing_points.columns;
+  const std::size_t points = p.inducing_points.rows;
+  write_kernel(c, p.kernel, inputs);
+  add_work(c, p.kernel, static_cast<double>(points), inputs);
+  c.work(CWork::kernel_weight, static_cast<double>(points));
+  c.local_reals(inputs);
+  c.add(R"c(
+static @real @mean(const @real *x) {
+  @real in[$INPUTS$], mean = (@real)0;
+  uint32_t i;
+  for (i = 0U; i < $INPUTS$U; ++i) in[i] = (x[i] - $CENTRE$[i]) * $FACTOR$[i];
+  for (i = 0U; i < $POINTS$U; ++i) mean += $WEIGHTS$[i] * @kernel(in, $AT$ + i * $INPUTS$U);
+  return $TARGET_CENTRE$ + $TARGET_SCALE$ * mean;
+}
+)c",
+        {{"INPUTS", fmt::format("{}", inputs)},
+         {"POINTS", fmt::format("{}", points)},
+         {"CENTRE", c.table("input_centre", p.scaling.inputs.centre)},
+         {"FACTOR", c.table("input_factor", input_factors(p.scaling))},
+         {"AT", c.table("inducing_points", p.inducing_points.values)},
+         {"WEIGHTS", c.table("weights", p.weights)},
+         {"TARGET_CENTRE", c.number(p.scaling.target_centre)},
+         {"TARGET_SCALE", c.number(p.scaling.target_scale)}});
+}
 
 void write_parametric_gp(CText& c, const ParametricGp::Parameters& p) {
   const std::size_t inputs = p.inducing_points.columns;
   const std::size_t points = p.inducing_points.rows;
   const Matrix root = root_of(p.explained);
   write_kernel(c, p.kernel, inputs);
-  const double values = static_cast<double>(points) + 1.0;
-  std::size_t kernels = 0;
-  for (const KernelNode& node : p.kernel.nodes)
-    if (node.kind < static_cast<std::size_t>(KernelKind::sum)) ++kernels;
-  c.work(CWork::kernel_term, values * static_cast<double>(kernels * inputs));
-  c.work(CWork::kernel_value, values * static_cast<double>(kernels));
+  add_work(c, p.kernel, static_cast<double>(points) + 1.0, inputs);
   c.work(CWork::kernel_weight, static_cast<double>(points * (root.rows + 1)));
   c.work(CWork::kernel_unit, static_cast<double>(root.rows));
-  c.work(CWork::kernel, static_cast<double>(kernels));
   c.work(CWork::root);
-  for (const KernelNode& node : p.kernel.nodes) add_functions(c, node, values, inputs);
-  std::vector<double> factors;
-  for (const double scale : p.scaling.inputs.scale) factors.push_back(1.0 / scale);
   c.member(fmt::format("@real covariance[{}]", points));
   c.local_reals(inputs);
   c.add(R"c(
@@ -174,7 +208,7 @@ static @estimate @model(@state *s, const @real *x) {
         {{"INPUTS", fmt::format("{}", inputs)},
          {"POINTS", fmt::format("{}", points)},
          {"CENTRE", c.table("input_centre", p.scaling.inputs.centre)},
-         {"FACTOR", c.table("input_factor", factors)},
+         {"FACTOR", c.table("input_factor", input_factors(p.scaling))},
          {"AT", c.table("inducing_points", p.inducing_points.values)},
          {"WEIGHTS", c.table("weights", p.weights)},
          {"ROWS", fmt::format("{}", root.rows)},

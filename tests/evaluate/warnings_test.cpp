@@ -59,6 +59,7 @@ TEST(UnusedInputs, AreThoseOfAGreyBoxWhoseCoefficientsAre0) {
   auto* const box = file.parameters.get_if<GreyBox::Parameters>();
   ASSERT_NE(box, nullptr);
   box->terms.banks.clear();
+  box->residual.reset();
   Matrix& values = box->coefficients.values;
   Matrix kept(values.rows, box->terms.columns());
   for (std::size_t k = 0; k < kept.rows; ++k)

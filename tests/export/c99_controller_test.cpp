@@ -227,9 +227,9 @@ AnyModel inverted_example() {
 
 template <class Family>
 class C99Controller : public testing::Test {};
-using Inverted =
-    testing::Types<Linear, LinearCoulomb, Polynomial, MaxwellSlipModel, PrandtlIshlinskii, GreyBox,
-                   GreyBoxWithBanks, GreyBoxWithMlp, Viscoelastic>;
+using Inverted = testing::Types<Linear, LinearCoulomb, Polynomial, MaxwellSlipModel,
+                                PrandtlIshlinskii, GreyBox, GreyBoxWithBanks, GreyBoxWithMlp,
+                                GreyBoxWithProducts, GreyBoxWithGp, Viscoelastic>;
 struct InvertedName {
   template <class M>
   static std::string GetName(int index) {

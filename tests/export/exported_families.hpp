@@ -54,9 +54,10 @@ AnyModel any_example() {
   return AnyModel(AnyModel::Parameters(example<Family>().parameters()));
 }
 
-using Exported = testing::Types<Linear, Scheduled, GreyBoxWithBanks, GreyBoxWithMlp, LinearCoulomb,
-                                Polynomial, MaxwellSlipModel, PrandtlIshlinskii, GreyBox, Mlp, Gru,
-                                Lstm, ParametricGp, Viscoelastic, HammersteinWiener>;
+using Exported =
+    testing::Types<Linear, Scheduled, GreyBoxWithBanks, GreyBoxWithMlp, GreyBoxWithProducts,
+                   GreyBoxWithGp, LinearCoulomb, Polynomial, MaxwellSlipModel, PrandtlIshlinskii,
+                   GreyBox, Mlp, Gru, Lstm, ParametricGp, Viscoelastic, HammersteinWiener>;
 struct ExportedName {
   template <class M>
   static std::string GetName(int index) {

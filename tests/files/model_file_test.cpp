@@ -45,7 +45,8 @@ template <class Family>
 class EveryFamily : public testing::Test {};
 template <class... Family>
 using WithResiduals =
-    testing::Types<Family..., test::GreyBoxWithMlp, test::GreyBoxWithDgmm, test::GreyBoxWithBanks>;
+    testing::Types<Family..., test::GreyBoxWithMlp, test::GreyBoxWithDgmm,
+                   test::GreyBoxWithProducts, test::GreyBoxWithGp, test::GreyBoxWithBanks>;
 TYPED_TEST_SUITE(EveryFamily, KnownFamilies::In<WithResiduals>);
 
 TYPED_TEST(EveryFamily, ComesBackBitForBit) {

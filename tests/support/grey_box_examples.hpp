@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
+#include "support/example_models.hpp"
 #include "support/examples/grey_box.hpp"
 #include "support/random_network.hpp"
 
@@ -14,6 +16,14 @@ struct GreyBoxWithMlp : GreyBox {
 };
 /// The same with a mixture.
 struct GreyBoxWithDgmm : GreyBox {
+  using GreyBox::GreyBox;
+};
+/// The same with products of the inputs.
+struct GreyBoxWithProducts : GreyBox {
+  using GreyBox::GreyBox;
+};
+/// The same with a Gaussian process that has no std_dev.
+struct GreyBoxWithGp : GreyBox {
   using GreyBox::GreyBox;
 };
 
@@ -53,6 +63,33 @@ inline GreyBoxWithBanks example<GreyBoxWithBanks>() {
 template <>
 inline GreyBoxWithMlp example<GreyBoxWithMlp>() {
   return GreyBoxWithMlp(grey_box_with(random_network<Mlp>({.inputs = 4, .hidden = {5}}, 11)));
+}
+
+/// All but one slip are used.
+template <>
+inline GreyBoxWithProducts example<GreyBoxWithProducts>() {
+  InputProducts::Parameters products{.degree = 3,
+                                     .centres = {0.01, -0.1, 0.2, 0.0},
+                                     .scales = {0.05, 0.3, 0.0, 0.6},
+                                     .coefficients = {}};
+  for (std::size_t i = 0; i < InputProducts::count(3, products.degree); ++i)
+    products.coefficients.push_back(0.4 * std::sin(1.7 * static_cast<double>(i + 1)));
+  return GreyBoxWithProducts(grey_box_with(std::move(products)));
+}
+
+template <>
+inline GreyBoxWithGp example<GreyBoxWithGp>() {
+  ParametricGp::Parameters process = example<ParametricGp>().parameters();
+  constexpr std::size_t kInputs = 4;
+  process.kernel = parse_kernel("se_ard", kInputs);
+  process.kernel.nodes.front().length_scales = {0.9, 1.2, 0.7, 1.5};
+  process.scaling.inputs = {.centre = {0.0, 0.1, -0.2, 0.0}, .scale = {0.06, 0.3, 0.5, 0.6}};
+  const std::size_t points = process.inducing_points.rows;
+  process.inducing_points = Matrix(points, kInputs);
+  for (std::size_t i = 0; i < process.inducing_points.values.size(); ++i)
+    process.inducing_points.values[i] = std::sin(2.3 * static_cast<double>(i));
+  process.explained = {};
+  return GreyBoxWithGp(grey_box_with(std::move(process)));
 }
 
 template <>

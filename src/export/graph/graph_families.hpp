@@ -29,6 +29,12 @@ struct GraphMotion {
 [[nodiscard]] GraphEstimate add_parametric_gp(GraphBuilder& graph,
                                               const ParametricGp::Parameters& p, Row features);
 
+/// Inputs about their centres, in units of their scales.
+[[nodiscard]] Row standardised_row(GraphBuilder& graph, const NetworkScaling& scaling, Row x);
+
+/// The value of the process alone.
+[[nodiscard]] Row gp_mean_row(GraphBuilder& graph, const ParametricGp::Parameters& p, Row features);
+
 /// The output of a static network for these inputs, without its scaling's fault.
 [[nodiscard]] Row network_row(GraphBuilder& graph, const Mlp::Parameters& p, Row x);
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -13,6 +14,36 @@
 
 namespace torsio {
 namespace {
+
+/// As `InputProducts`: each product is one of three factors, which are inputs or 1.
+Row products_row(GraphBuilder& graph, const InputProducts::Parameters& p, Row x) {
+  const std::vector<std::size_t> used = p.used();
+  const std::size_t inputs = x.width();
+  std::vector<double> factors(inputs, 0.0);
+  for (const std::size_t i : used) factors[i] = 1.0 / p.scales[i];
+  std::array<Matrix, InputProducts::kHighestDegree> chosen;
+  for (Matrix& of_factor : chosen) of_factor = Matrix(inputs + 1, p.coefficients.size());
+  std::size_t column = 0;
+  const auto add = [&](std::size_t i, std::size_t j, std::size_t k) {
+    chosen[0](i, column) = chosen[1](j, column) = chosen[2](k, column) = 1.0;
+    ++column;
+  };
+  add(inputs, inputs, inputs);
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    add(used[i], inputs, inputs);
+    for (std::size_t j = i; j < used.size(); ++j) {
+      add(used[i], used[j], inputs);
+      for (std::size_t k = j; p.degree == InputProducts::kHighestDegree && k < used.size(); ++k)
+        add(used[i], used[j], used[k]);
+    }
+  }
+  const Row z = (x - graph.constant(p.centres)) * graph.constant(factors);
+  const Row z_and_one = joined(std::vector<Row>{z, graph.constant(1.0)});
+  Row terms = product(z_and_one, graph.constant(chosen[0]));
+  for (std::size_t f = 1; f < chosen.size(); ++f)
+    terms = terms * product(z_and_one, graph.constant(chosen[f]));
+  return dot(terms, graph.constant(p.coefficients));
+}
 
 class GreyBoxGraph {
  public:
@@ -182,16 +213,23 @@ class GreyBoxGraph {
     }
   }
 
+  Row residual_model(Row y) {
+    const auto& model = box_.residual->model;
+    if (const auto* network = std::get_if<Mlp::Parameters>(&model))
+      return network_row(graph_, *network, y);
+    if (const auto* products = std::get_if<InputProducts::Parameters>(&model))
+      return products_row(graph_, *products, y);
+    if (const auto* process = std::get_if<ParametricGp::Parameters>(&model))
+      return gp_mean_row(graph_, *process, y);
+    throw UsageError({.place = "the model",
+                      .expected = "a grey_box without a mixture as its residual",
+                      .found = "a mixture as its residual",
+                      .advice = "Fit it again with --set residual=auto or residual=none."});
+  }
+
   /// A bounded correction, faded out where an input leaves what it was trained on.
   Row residual(Row slips) {
     const GreyBoxResidual& learned = *box_.residual;
-    const auto* network = std::get_if<Mlp::Parameters>(&learned.model);
-    if (network == nullptr)
-      throw UsageError(
-          {.place = "the model",
-           .expected = "a grey_box without a residual, or with a network as its residual",
-           .found = "a mixture as its residual",
-           .advice = "Fit it again with --set residual=mlp or residual=none."});
     std::vector<Row> inputs{x_};
     if (!terms_.thresholds.empty()) inputs.push_back(slips);
     const Row y = joined(inputs);
@@ -206,7 +244,7 @@ class GreyBoxGraph {
         maximum(graph_.constant(learned.lowest) - y, y - graph_.constant(learned.highest));
     const Row borders = maximum(left_by, 0.0) * graph_.constant(per_border);
     const Row share = maximum(1.0 - largest(borders), 0.0);
-    const Row correction = network_row(graph_, *network, y);
+    const Row correction = residual_model(y);
     const Row is_usable = both(is_finite(correction), 0.0 < share);
     return select(is_usable, share * limited(correction, -learned.bound, learned.bound), 0.0);
   }

@@ -72,22 +72,34 @@ Row kernel_row(GraphBuilder& graph, const KernelExpression& kernel, Row x, const
   return operands.back();
 }
 
+/// Covariances of a row with the inducing points.
+Row covariance_row(GraphBuilder& graph, const ParametricGp::Parameters& p, Row in) {
+  return kernel_row(graph, p.kernel, in, [&](std::size_t i) {
+    std::vector<double> coordinates;
+    for (std::size_t m = 0; m < p.inducing_points.rows; ++m)
+      coordinates.push_back(p.inducing_points(m, i));
+    return graph.constant(coordinates);
+  });
+}
+
 }  // namespace
+
+Row gp_mean_row(GraphBuilder& graph, const ParametricGp::Parameters& p, Row features) {
+  graph.use_wide(true);
+  const Row in = standardised_row(graph, p.scaling, graph.as_number(features));
+  const Row mean = dot(covariance_row(graph, p, in), graph.constant(p.weights));
+  const Row value = mean * p.scaling.target_scale + p.scaling.target_centre;
+  graph.use_wide(false);
+  return to_real(value);
+}
 
 // In wide numbers: the variance is the difference of two nearly equal ones, and the weights are large.
 GraphEstimate add_parametric_gp(GraphBuilder& graph, const ParametricGp::Parameters& p,
                                 Row features) {
   graph.use_wide(true);
   const Row x = graph.as_number(features);
-  std::vector<double> factors;
-  for (const double scale : p.scaling.inputs.scale) factors.push_back(1.0 / scale);
-  const Row in = (x - graph.constant(p.scaling.inputs.centre)) * graph.constant(factors);
-  const Row covariance = kernel_row(graph, p.kernel, in, [&](std::size_t i) {
-    std::vector<double> coordinates;
-    for (std::size_t m = 0; m < p.inducing_points.rows; ++m)
-      coordinates.push_back(p.inducing_points(m, i));
-    return graph.constant(coordinates);
-  });
+  const Row in = standardised_row(graph, p.scaling, x);
+  const Row covariance = covariance_row(graph, p, in);
   const Row mean = dot(covariance, graph.constant(p.weights));
   const Row own = kernel_row(graph, p.kernel, in, [&](std::size_t i) { return in.part(i); });
   const Row left = own - dot(covariance, product(covariance, graph.constant(p.explained)));

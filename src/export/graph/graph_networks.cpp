@@ -27,12 +27,6 @@ Row single_row(GraphBuilder& graph, std::span<const float> values) {
   return graph.single_constant(std::move(row));
 }
 
-Row standardised_row(GraphBuilder& graph, const NetworkScaling& scaling, Row x) {
-  std::vector<double> factors;
-  for (const double scale : scaling.inputs.scale) factors.push_back(1.0 / scale);
-  return to_single((x - graph.constant(scaling.inputs.centre)) * graph.constant(factors));
-}
-
 Row destandardised_row(const NetworkScaling& scaling, Row y) {
   return to_real(y) * scaling.target_scale + scaling.target_centre;
 }
@@ -104,7 +98,7 @@ Row recurrent_rows(GraphBuilder& graph, const std::string& name, const GruLayer&
 
 template <class Layer>
 GraphEstimate recurrent_estimate(GraphBuilder& graph, const RecurrentParameters<Layer>& p, Row x) {
-  Row y = standardised_row(graph, p.scaling, x);
+  Row y = to_single(standardised_row(graph, p.scaling, x));
   for (std::size_t i = 0; i < p.layers.size(); ++i)
     y = recurrent_rows(graph, fmt::format("layer_{}", i), p.layers[i], y);
   GraphEstimate estimate =
@@ -120,9 +114,15 @@ GraphEstimate recurrent_estimate(GraphBuilder& graph, const RecurrentParameters<
 
 }  // namespace
 
+Row standardised_row(GraphBuilder& graph, const NetworkScaling& scaling, Row x) {
+  std::vector<double> factors;
+  for (const double scale : scaling.inputs.scale) factors.push_back(1.0 / scale);
+  return (x - graph.constant(scaling.inputs.centre)) * graph.constant(factors);
+}
+
 Row network_row(GraphBuilder& graph, const Mlp::Parameters& p, Row x) {
-  return destandardised_row(p.scaling,
-                            dense_rows(graph, p.layers, standardised_row(graph, p.scaling, x)));
+  return destandardised_row(
+      p.scaling, dense_rows(graph, p.layers, to_single(standardised_row(graph, p.scaling, x))));
 }
 
 GraphEstimate add_network(GraphBuilder& graph, const Mlp::Parameters& p, Row x) {

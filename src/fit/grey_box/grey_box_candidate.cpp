@@ -14,18 +14,26 @@ namespace {
 using Index = Eigen::Index;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr std::array<std::size_t, GreyBoxChoice::kMaxSlips + 1> kSlips{0, 1, 2, 4, 8};
 constexpr std::array<std::size_t, GreyBoxChoice::kMaxBranches + 1> kBranches{0, 3, 6};
 constexpr std::array kSmoothing{1e-6, 1e-4, 1e-2};
 constexpr std::size_t kMaxColumns = 160;
 
-/// Indices that n of `count` geometric values keep: from the finest on, evenly spread.
-std::vector<std::size_t> kept(std::size_t n, std::size_t count) {
-  std::vector<std::size_t> indices;
-  if (n == 1) return {1};  // the second finest: above the resolution, below any loop
-  const std::size_t stride = n == 0 ? 1 : count / n;
-  for (std::size_t i = 0; i < n; ++i) indices.push_back(i * stride);
-  return indices;
+/// The thresholds of a choice, as places among the finest ones.
+std::vector<std::size_t> chosen_slips(const GreyBoxChoice& choice) {
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < GreyBoxSums::kThresholds; ++i)
+    if ((choice.slips >> i & 1U) != 0) places.push_back(i);
+  return places;
+}
+
+/// The time constants of a choice, as places among the finest ones: from the fastest on, evenly spread.
+std::vector<std::size_t> chosen_branches(const GreyBoxChoice& choice) {
+  const std::size_t count = kBranches.at(choice.branches);
+  std::vector<std::size_t> places;
+  places.reserve(count);
+  for (std::size_t i = 0; i < count; ++i)
+    places.push_back(i * (GreyBoxSums::kTimeConstants / count));
+  return places;
 }
 
 GreyBoxTerms::Structure main_structure_of(const GreyBoxTerms::Structure& all,
@@ -37,9 +45,8 @@ GreyBoxTerms::Structure main_structure_of(const GreyBoxTerms::Structure& all,
   own.friction_knots = choice.forces == 0
                            ? std::vector<double>{0.5 * (low + high)}
                            : evenly(low, high, (std::size_t{1} << choice.forces) + 1);
-  for (const std::size_t i : kept(kSlips[choice.slips], GreyBoxSums::kThresholds))
-    own.thresholds.push_back(all.thresholds[i]);
-  for (const std::size_t i : kept(kBranches[choice.branches], GreyBoxSums::kTimeConstants))
+  for (const std::size_t i : chosen_slips(choice)) own.thresholds.push_back(all.thresholds[i]);
+  for (const std::size_t i : chosen_branches(choice))
     own.time_constants_s.push_back(all.time_constants_s[i]);
   own.rate_scales.assign(all.inputs(), 0.0);
   if (choice.has_coulomb) own.rate_scales = all.rate_scales;
@@ -139,7 +146,7 @@ void GreyBoxCandidate::add_main_columns(std::vector<ColumnShare>& shares) const 
   constexpr std::size_t kKnots = GreyBoxSums::kKnots;
   add_hats(shares, 0, kKnots, 0, structure_.curve_knots.size());
   const std::size_t forces = structure_.friction_knots.size();
-  const auto slips = kept(kSlips[choice_.slips], GreyBoxSums::kThresholds);
+  const auto slips = chosen_slips(choice_);
   for (std::size_t i = 0; i < slips.size(); ++i) {
     const std::size_t fine = sums_.all.first_slip() + slips[i] * kKnots;
     const std::size_t coarse = structure_.first_slip() + i * forces;
@@ -148,7 +155,7 @@ void GreyBoxCandidate::add_main_columns(std::vector<ColumnShare>& shares) const 
     else
       for (std::size_t k = 0; k < kKnots; ++k) one(fine + k, coarse);
   }
-  const auto branches = kept(kBranches[choice_.branches], GreyBoxSums::kTimeConstants);
+  const auto branches = chosen_branches(choice_);
   for (std::size_t i = 0; i < branches.size(); ++i)
     one(sums_.all.first_relaxation() + branches[i], structure_.first_relaxation() + i);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "fit/grey_box/grey_box_sums.hpp"
@@ -10,18 +11,17 @@ namespace torsio {
 
 /// The terms of a grey box: a position in each of these sequences of structures.
 struct GreyBoxChoice {
-  std::size_t curve = 0;               ///< 2^curve + 1 knots
-  std::size_t slips = 0;               ///< 0, 1, 2, 4, 8 thresholds
-  std::size_t forces = 0;              ///< 0: the same everywhere; else 2^forces + 1 knots
-  std::size_t branches = 0;            ///< 0, 3, 6 time constants
-  std::size_t smoothing = 2;           ///< λ = 1e-6, 1e-4, 1e-2
-  bool is_signed = false;              ///< slip forces of any sign
-  bool is_passive = false;             ///< slopes and friction of rates >= 0, too
-  bool has_viscous = false;            ///< slopes of rates
-  bool has_coulomb = false;            ///< tanh of rates
+  std::size_t curve = 0;      ///< 2^curve + 1 knots
+  std::uint32_t slips = 0;    ///< a bit for each of the finest thresholds, the smallest first
+  std::size_t forces = 0;     ///< 0: the same everywhere; else 2^forces + 1 knots
+  std::size_t branches = 0;   ///< 0, 3, 6 time constants
+  std::size_t smoothing = 2;  ///< λ = 1e-6, 1e-4, 1e-2
+  bool is_signed = false;     ///< slip forces of any sign
+  bool is_passive = false;    ///< slopes and friction of rates >= 0, too
+  bool has_viscous = false;   ///< slopes of rates
+  bool has_coulomb = false;   ///< tanh of rates
   std::vector<BankChoice> banks = {};  ///< one for each finest bank of the sums, or none
 
-  static constexpr std::size_t kMaxSlips = 4;     ///< the highest place
   static constexpr std::size_t kMaxBranches = 2;  ///< the highest place
 
   bool operator==(const GreyBoxChoice&) const = default;

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
 #include <optional>
 
 #include "core/report_progress.hpp"
@@ -17,9 +20,39 @@ constexpr double kWorthwhileOfFew = 0.95;
 /// All banks together.
 constexpr double kTogether = 0.9;
 constexpr double kTogetherOfFew = 0.8;
+/// Thresholds that are chosen one by one, beside an even spread of them.
+constexpr double kThresholdsTogether = 0.55;
+
+/// None, the second finest threshold, which is above the resolution and below any loop, and 2, 4 and 8 that are spread
+/// evenly.
+constexpr std::array<std::uint32_t, 5> kSpreads{0, 0b10, 0b00010001, 0b01010101, 0b11111111};
+
+/// The next spreads up to two places further, or one place back.
+std::vector<std::uint32_t> other_spreads(std::uint32_t at) {
+  const auto place = static_cast<std::size_t>(std::ranges::find(kSpreads, at) - kSpreads.begin());
+  std::vector<std::uint32_t> others;
+  for (std::size_t to = place + 1; to <= place + 2 && to < kSpreads.size(); ++to)
+    others.push_back(kSpreads.at(to));
+  if (place > 1) others.push_back(kSpreads.at(place - 1));
+  return others;
+}
+
+/// One slip element more, one less, or one with another threshold.
+std::vector<std::uint32_t> other_thresholds(std::uint32_t at) {
+  std::vector<std::uint32_t> others;
+  for (std::size_t i = 0; i < GreyBoxSums::kThresholds; ++i) {
+    const std::uint32_t one = at ^ (1U << i);
+    if (one != 0) others.push_back(one);
+    for (std::size_t j = 0; j < i; ++j)
+      if ((at >> i & 1U) != (at >> j & 1U)) others.push_back(one ^ (1U << j));
+  }
+  return others;
+}
 
 /// One step up any sequence from `at`.
-std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
+/// @param others thresholds of the slip elements: `other_spreads` or `other_thresholds`
+std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates,
+                                    std::vector<std::uint32_t> (*others)(std::uint32_t)) {
   std::vector<GreyBoxChoice> next;
   const auto with = [&](auto change) {
     GreyBoxChoice candidate = at;
@@ -29,10 +62,9 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
   // Two at a time as well: three knots show nothing of a curve that stiffens both ways alike.
   for (std::size_t by = 1; by <= 2; ++by) {
     if (at.curve + by <= GreyBoxSums::kFinest) with([by](auto& c) { c.curve += by; });
-    if (at.slips + by <= GreyBoxChoice::kMaxSlips) with([by](auto& c) { c.slips += by; });
   }
+  for (const std::uint32_t slips : others(at.slips)) with([slips](auto& c) { c.slips = slips; });
   if (at.slips > 0 && at.forces < GreyBoxSums::kFinest) with([](auto& c) { ++c.forces; });
-  if (at.slips > 1) with([](auto& c) { --c.slips; });
   if (at.branches < GreyBoxChoice::kMaxBranches) with([](auto& c) { ++c.branches; });
   if (at.smoothing > 0) with([](auto& c) { --c.smoothing; });
   if (!at.is_passive && !at.is_signed && at.slips > 0) with([](auto& c) { c.is_signed = true; });
@@ -40,7 +72,7 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
   if (!at.is_passive && at.slips == 0)
     with([](auto& c) {
       c.is_signed = true;
-      c.slips = 1;
+      c.slips = kSpreads[1];
       c.forces = 2;
     });
   if (!at.is_passive && at.slips > 0 && at.forces + 1 < GreyBoxSums::kFinest)
@@ -139,8 +171,21 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& pro
 GreyBoxSearch::Candidate GreyBoxSearch::choose(const GreyBoxChoice& line,
                                                const Progress& progress) const {
   const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
-  const auto next = [has_rates](const GreyBoxChoice& at) { return steps_up(at, has_rates); };
+  const auto next = [has_rates](const GreyBoxChoice& at) {
+    return steps_up(at, has_rates, other_spreads);
+  };
   return climbed(rated(line), kWorthwhile, next, progress);
+}
+
+GreyBoxSearch::Candidate GreyBoxSearch::choose_thresholds(const Candidate& spread,
+                                                          const Progress& progress) const {
+  const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
+  const auto next = [has_rates](const GreyBoxChoice& at) {
+    return steps_up(at, has_rates, other_thresholds);
+  };
+  const Candidate chosen =
+      climbed(rated({.is_passive = spread.choice.is_passive}), kWorthwhile, next, progress);
+  return chosen.score < kThresholdsTogether * spread.score ? chosen : spread;
 }
 
 const char* GreyBoxSearch::what_was_held_out() const {

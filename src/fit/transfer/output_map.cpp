@@ -37,6 +37,11 @@ void map(Dgmm::Parameters& dgmm, double gain, double offset) {
   clamp.width *= gain;
 }
 
+void map(InputProducts::Parameters& products, double gain, double offset) {
+  for (double& coefficient : products.coefficients) coefficient *= gain;
+  products.coefficients.front() += offset;
+}
+
 void map(Linear::Parameters& linear, double gain, double offset) {
   for (double& value : linear.coefficients.values.values) value *= gain;
   add_to(linear.coefficients, 0, 1, offset);
@@ -48,9 +53,15 @@ void map(GreyBox::Parameters& box, double gain, double offset) {
   add_to(box.coefficients, 0, box.terms.curve_knots.size(), offset);
   if (!box.residual) return;
   box.residual->bound *= gain;
-  if (auto* const mlp = std::get_if<Mlp::Parameters>(&box.residual->model))
-    map(mlp->scaling, gain, 0.0);
-  if (auto* const dgmm = std::get_if<Dgmm::Parameters>(&box.residual->model)) map(*dgmm, gain, 0.0);
+  std::visit(
+      [gain]<class P>(P& model) {
+        if constexpr (requires { model.scaling; }) {
+          map(model.scaling, gain, 0.0);
+        } else {
+          map(model, gain, 0.0);
+        }
+      },
+      box.residual->model);
 }
 
 /// @returns whether the family is one of these.

@@ -18,7 +18,8 @@ ParametricGp::Parameters checked(ParametricGp::Parameters parameters) {
   check_kernel_model(parameters, parameters.inducing_points, "inducing_points", "parametric_gp",
                      ParametricGp::kMaxPoints);
   const std::size_t size = parameters.inducing_points.rows;
-  check_shape(parameters.explained, size, size, "parametric_gp: explained");
+  if (parameters.has_std_dev())
+    check_shape(parameters.explained, size, size, "parametric_gp: explained");
   return parameters;
 }
 
@@ -56,6 +57,7 @@ Estimate ParametricGp::step(Features features) noexcept {
   standardise(parameters_.scaling, features, input_.data());
   kernel_.row(input_.data(), points_, points_.size(), values_.data());
   const double mean = kernel_kernels::dot(values_.data(), weights_.data(), values_.size());
+  if (!parameters_.has_std_dev()) return kernel_estimate(parameters_, input_, mean);
   const double explained =
       kernel_kernels::quadratic_form(explained_.data(), values_.data(), points_.size());
   return kernel_estimate(parameters_, input_, mean, {kernel_.self(input_.data()), explained});

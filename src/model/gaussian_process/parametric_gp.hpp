@@ -24,8 +24,8 @@ namespace torsio {
 /// optimum of a variational bound. Novelty is the share of the prior variance that the data have
 /// not explained.
 ///
-/// Source: paper 002 with the errata of specification 1, specification 3.3. Cost: M kernel values
-/// and M^2 multiply-adds.
+/// Source: paper 002 with the errata of specification 1, specification 3.3. Cost: M kernel values, and M^2
+/// multiply-adds for the std_dev.
 class ParametricGp {
  public:
   static constexpr std::string_view kFamily = "parametric_gp";
@@ -38,7 +38,7 @@ class ParametricGp {
     double noise_variance = 0.0;  ///< sigma^2, of the standardised target
     Matrix inducing_points;       ///< Z: M x inputs, standardised
     std::vector<double> weights;  ///< alpha
-    Matrix explained;             ///< C: M x M, symmetric
+    Matrix explained;             ///< C: M x M, symmetric; 0 x 0: only values, no std_dev
 
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {
@@ -50,6 +50,8 @@ class ParametricGp {
       visit("explained", self.explained);
     }
     bool operator==(const Parameters&) const = default;
+
+    [[nodiscard]] bool has_std_dev() const noexcept { return explained.rows > 0; }
   };
 
   /// @throws Error if shapes disagree, a number is not finite, a scale or the noise is not positive,
@@ -60,7 +62,8 @@ class ParametricGp {
   [[nodiscard]] std::size_t input_count() const noexcept { return kernel_.input_count(); }
   [[nodiscard]] std::size_t parameter_count() const noexcept {
     const std::size_t m = parameters_.weights.size();
-    return m * (1 + input_count()) + m * (m + 1) / 2 + kernel_.parameter_count() + 1;
+    const std::size_t spread = parameters_.has_std_dev() ? m * (m + 1) / 2 + 1 : 0;
+    return m * (1 + input_count()) + spread + kernel_.parameter_count();
   }
 
   void reset() noexcept {}

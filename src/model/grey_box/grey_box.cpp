@@ -46,15 +46,6 @@ GreyBoxTerms::Structure checked(GreyBoxTerms::Structure structure) {
   return structure;
 }
 
-/// What `use` returns of the residual's model; where there is none, 0.
-template <class Residual, class Use>
-auto of_residual(Residual& residual, const Use& use) noexcept
-    -> decltype(use(*std::get_if<Mlp>(&residual))) {
-  if (auto* const mlp = std::get_if<Mlp>(&residual)) return use(*mlp);
-  if (auto* const dgmm = std::get_if<Dgmm>(&residual)) return use(*dgmm);
-  return {};
-}
-
 }  // namespace
 
 GreyBoxTerms::GreyBoxTerms(Structure structure)
@@ -137,29 +128,16 @@ GreyBox::GreyBox(Parameters parameters)
   jumped_.resize(terms_.bank_states());
   banks_follow_x_ = std::ranges::any_of(parameters_.terms.banks, &InputBank::follows_x);
   if (!parameters_.residual) return;
-  const GreyBoxResidual& learned = *parameters_.residual;
-  std::visit([this]<class P>(const P& own) { residual_.emplace<typename P::Family>(own); },
-             learned.model);
-  const std::size_t inputs =
-      of_residual(residual_, [](const auto& model) { return model.input_count(); });
+  correction_.emplace(*parameters_.residual);
   const std::size_t expected = input_count() + parameters_.terms.thresholds.size();
-  require(
-      inputs == expected && learned.lowest.size() == expected && learned.highest.size() == expected,
-      {GreyBox::kFamily, "residual"}, "the inputs of the box and its slips",
-      std::to_string(inputs) + " inputs");
-  for (std::size_t j = 0; j < expected; ++j)
-    require(std::isfinite(learned.lowest[j]) && std::isfinite(learned.highest[j]) &&
-                learned.lowest[j] <= learned.highest[j],
-            {GreyBox::kFamily, "residual range"}, "lowest <= highest",
-            as_text(learned.lowest[j]) + ", " + as_text(learned.highest[j]));
-  require(std::isfinite(learned.bound) && learned.bound >= 0.0,
-          {GreyBox::kFamily, "residual bound"}, "a number >= 0", learned.bound);
-  residual_inputs_.resize(expected);
+  require(correction_->input_count() == expected, {GreyBox::kFamily, "residual"},
+          "the inputs of the box and its slips",
+          std::to_string(correction_->input_count()) + " inputs");
+  correction_inputs_.resize(expected);
 }
 
 std::size_t GreyBox::parameter_count() const noexcept {
-  return coefficients_.fitted_count() +
-         of_residual(residual_, [](const auto& model) { return model.parameter_count(); });
+  return coefficients_.fitted_count() + (correction_ ? correction_->parameter_count() : 0);
 }
 
 ModelMemory GreyBox::memory(const InputRanges& ranges) const {
@@ -222,26 +200,12 @@ bool GreyBox::advance(Features features) noexcept {
 }
 
 double GreyBox::residual(Features features) noexcept {
-  if (!parameters_.residual) return 0.0;
-  const GreyBoxResidual& learned = *parameters_.residual;
-  std::ranges::copy(features, residual_inputs_.begin());
-  residual_inputs_[0] = terms_.position();
+  if (!correction_) return 0.0;
+  std::ranges::copy(features, correction_inputs_.begin());
+  correction_inputs_[0] = terms_.position();
   std::ranges::copy(state().first(parameters_.terms.thresholds.size()),
-                    residual_inputs_.begin() + static_cast<std::ptrdiff_t>(features.size()));
-  double share = 1.0;
-  for (std::size_t j = 0; j < residual_inputs_.size(); ++j) {
-    const double low = learned.lowest[j];
-    const double high = learned.highest[j];
-    const double left_by = std::max(low - residual_inputs_[j], residual_inputs_[j] - high);
-    if (left_by <= 0.0) continue;
-    const double border = GreyBoxResidual::kBorder * (high - low);
-    if (!(left_by < border)) return 0.0;  // NaN too
-    share = std::min(share, 1.0 - left_by / border);
-  }
-  const double correction =
-      of_residual(residual_, [this](auto& model) { return model.step(residual_inputs_).value; });
-  if (!std::isfinite(correction)) return 0.0;
-  return share * std::min(std::max(correction, -learned.bound), learned.bound);
+                    correction_inputs_.begin() + static_cast<std::ptrdiff_t>(features.size()));
+  return correction_->value(correction_inputs_);
 }
 
 template <class Coefficient>

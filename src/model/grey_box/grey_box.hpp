@@ -6,16 +6,14 @@
 #include <optional>
 #include <span>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "core/hyperbolic_tangent.hpp"
 #include "model/common/schedule.hpp"
+#include "model/grey_box/grey_box_correction.hpp"
 #include "model/grey_box/hats.hpp"
 #include "model/grey_box/input_bank.hpp"
 #include "model/hysteresis/slip_bank.hpp"
-#include "model/mixture/dgmm.hpp"
-#include "model/network/mlp.hpp"
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/memory.hpp"
@@ -201,24 +199,6 @@ class GreyBoxTerms {
   bool is_started_ = false;
 };
 
-/// A learned correction to a grey box: a network or a mixture of the inputs and of the slips s_i / r_i,
-/// bounded, and faded out where an input leaves what it was trained on.
-struct GreyBoxResidual {
-  std::variant<Mlp::Parameters, Dgmm::Parameters> model = {};
-  double bound = 0.0;               ///< largest |correction|, target's unit
-  std::vector<double> lowest = {};  ///< per input, in training
-  std::vector<double> highest = {};
-  static constexpr double kBorder = 0.1;  ///< share of the range: end of the fading beyond it
-
-  template <class Self, class Visit>
-  static void visit_fields(Self& self, Visit&& visit) {
-    visit("model", self.model);
-    visit("bound", self.bound);
-    visit("lowest", self.lowest);
-    visit("highest", self.highest);
-  }
-};
-
 /// torsio's own spring model: what physics allows, and of that what the data ask for.
 ///
 ///     y = curve(x) + sum_i w_i(x) s_i / r_i + sum_j k_j v_j + sum_l (k_l x_l + f_l tanh(x_l / u_l))
@@ -229,7 +209,7 @@ struct GreyBoxResidual {
 /// other inputs (rates); for another input with a bank of its own, slip operators, a curve, a product
 /// and an inertia (`InputBank`); see `GreyBoxTerms`. All coefficients may be scheduled over one input. With
 /// w_i constant and >= 0, k_j >= 0, an ascending curve and no bank it is passive. The residual, if there is
-/// one, is a small network or mixture, bounded, and faded out away from its training data. A fit
+/// one, is a small model of its own (`GreyBoxResidual`), bounded, and faded out away from its training data. A fit
 /// chooses which terms there are by cross-validation (fit/grey_box/fit_grey_box.hpp). A family of its own:
 /// no paper has it; the parts are those of specification 3.6 and 3.7. Cost: some 4 (2 + 2
 /// thresholds + branches + inputs) multiply-adds, those of the banks, and that of the
@@ -311,8 +291,8 @@ class GreyBox {
   Parameters parameters_;
   GreyBoxTerms terms_;
   ScheduledCoefficients coefficients_;
-  std::variant<std::monostate, Mlp, Dgmm> residual_;  ///< the first: none
-  std::vector<double> residual_inputs_;
+  std::optional<GreyBoxCorrection> correction_;
+  std::vector<double> correction_inputs_;
   std::vector<double> jumped_;  ///< states of the banks, while inverting
   bool banks_follow_x_ = false;
 };
