@@ -291,14 +291,15 @@ TEST(BrokenModelFile, WithAResidualThatIsNotOneModel) {
   EXPECT_EQ(without("model.residual."), "") << "a box without a residual";
   EXPECT_THAT(add("model.residual.model.dgmm.clamp.width"),
               AllOf(HasSubstr("elbow: /model.residual.model.mlp."),
-                    HasSubstr("expected tensors of one of mlp, dgmm, found dgmm and mlp")));
+                    HasSubstr("expected tensors of one of mlp, dgmm, products, parametric_gp, "
+                              "found dgmm and mlp")));
   EXPECT_THAT(add("model.residual.model.lstm.sample_period_s"),
               HasSubstr("elbow: /model.residual.model.lstm.sample_period_s: expected tensors of "
-                        "one of mlp, dgmm, found 'lstm'"));
+                        "one of mlp, dgmm, products, parametric_gp, found 'lstm'"));
   EXPECT_THAT(add("model.residual.mlp"), HasSubstr("elbow: /model.residual.mlp: expected only"));
   EXPECT_THAT(without("model.residual.model."),
               HasSubstr("elbow: /model.residual.model: expected tensors of one of mlp, dgmm, "
-                        "found none"));
+                        "products, parametric_gp, found none"));
   EXPECT_THAT(without("model.residual.bound"),
               HasSubstr("elbow: /model.residual.bound: expected a tensor, found none"));
   EXPECT_THAT(add("model.residual.model.mlp.layers.64.bias"), HasSubstr("at most 64 elements"));

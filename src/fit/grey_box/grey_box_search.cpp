@@ -21,7 +21,7 @@ constexpr double kWorthwhileOfFew = 0.95;
 constexpr double kTogether = 0.9;
 constexpr double kTogetherOfFew = 0.8;
 /// Thresholds that are chosen one by one, beside an even spread of them.
-constexpr double kThresholdsTogether = 0.55;
+constexpr double kThresholdsTogether = 0.5;
 
 /// None, the second finest threshold, which is above the resolution and below any loop, and 2, 4 and 8 that are spread
 /// evenly.

@@ -33,7 +33,7 @@ class GreyBoxSearch {
   /// The same, from these terms on. @param line with banks, if they are chosen
   [[nodiscard]] Candidate choose(const GreyBoxChoice& line, const Progress& progress) const;
 
-  /// Terms with thresholds that are chosen one by one, if they lower the held-out error by 45 %. Smaller gains did
+  /// Terms with thresholds that are chosen one by one, if they halve the held-out error. Smaller gains did
   /// not carry over to other motions; these did.
   /// @param spread what `choose` has chosen
   [[nodiscard]] Candidate choose_thresholds(const Candidate& spread,
