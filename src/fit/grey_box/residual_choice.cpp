@@ -9,6 +9,7 @@
 #include <exception>
 #include <limits>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -325,17 +326,22 @@ std::string note_of(const Candidate& candidate, const Gain& gain, bool has_recor
       100.0 * (share - 1.0), 50.0 * gain.std_error / share);
 }
 
-/// The best of those that predict whole recordings, if it is worthwhile, else the network.
+/// The process if it is worthwhile, since it only describes what is near its data, else the better products, else the
+/// network; if none is, the best one of the former.
 std::size_t place_of_best(const std::array<Gain, kCandidates.size()>& gains) {
-  std::size_t network = 0;
-  std::size_t best = kCandidates.size();
-  for (std::size_t c = 0; c < gains.size(); ++c) {
-    if (kCandidates.at(c).is_tried_on_blocks())
-      network = c;
-    else if (best == kCandidates.size() || gains.at(c).mean > gains.at(best).mean)
-      best = c;
-  }
-  return gains.at(best).is_worthwhile() || !gains.at(network).is_worthwhile() ? best : network;
+  const auto better = [&](std::size_t a, std::size_t b) {
+    const auto rank = [&](std::size_t c) {
+      const bool is_worthwhile = gains.at(c).is_worthwhile();
+      return std::tuple(is_worthwhile, !kCandidates.at(c).is_tried_on_blocks(),
+                        is_worthwhile && kCandidates.at(c).kind == ResidualKind::gp,
+                        gains.at(c).mean);
+    };
+    return rank(a) > rank(b);
+  };
+  std::size_t best = 0;
+  for (std::size_t c = 1; c < gains.size(); ++c)
+    if (better(c, best)) best = c;
+  return best;
 }
 
 }  // namespace
