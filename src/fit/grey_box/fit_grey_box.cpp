@@ -4,21 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <cmath>
-#include <cstdint>
-#include <exception>
-#include <limits>
-#include <optional>
-#include <string_view>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "core/report_progress.hpp"
-#include "fit/common/folds.hpp"
 #include "fit/common/held_out.hpp"
-#include "fit/common/model_run.hpp"
 #include "fit/grey_box/grey_box_search.hpp"
 #include "fit/grey_box/late_target.hpp"
 #include "fit/grey_box/residual_choice.hpp"

@@ -52,7 +52,7 @@ std::vector<std::uint32_t> other_thresholds(std::uint32_t at) {
 /// One step up any sequence from `at`.
 /// @param others thresholds of the slip elements: `other_spreads` or `other_thresholds`
 std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates,
-                                    std::vector<std::uint32_t> (*others)(std::uint32_t)) {
+                                    GreyBoxSearch::OtherSlips* others) {
   std::vector<GreyBoxChoice> next;
   const auto with = [&](auto change) {
     GreyBoxChoice candidate = at;
@@ -170,21 +170,20 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& pro
 
 GreyBoxSearch::Candidate GreyBoxSearch::choose(const GreyBoxChoice& line,
                                                const Progress& progress) const {
+  return climbed(line, other_spreads, progress);
+}
+
+GreyBoxSearch::Candidate GreyBoxSearch::climbed(const GreyBoxChoice& line, OtherSlips* others,
+                                                const Progress& progress) const {
   const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
-  const auto next = [has_rates](const GreyBoxChoice& at) {
-    return steps_up(at, has_rates, other_spreads);
-  };
+  const auto next = [&](const GreyBoxChoice& at) { return steps_up(at, has_rates, others); };
   return climbed(rated(line), kWorthwhile, next, progress);
 }
 
 GreyBoxSearch::Candidate GreyBoxSearch::choose_thresholds(const Candidate& spread,
                                                           const Progress& progress) const {
-  const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
-  const auto next = [has_rates](const GreyBoxChoice& at) {
-    return steps_up(at, has_rates, other_thresholds);
-  };
   const Candidate chosen =
-      climbed(rated({.is_passive = spread.choice.is_passive}), kWorthwhile, next, progress);
+      climbed({.is_passive = spread.choice.is_passive}, other_thresholds, progress);
   return chosen.score < kThresholdsTogether * spread.score ? chosen : spread;
 }
 

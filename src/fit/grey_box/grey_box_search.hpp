@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "fit/grey_box/grey_box_candidate.hpp"
 #include "torsio/core/progress.hpp"
@@ -21,6 +23,9 @@ class GreyBoxSearch {
   GreyBoxSearch(const TrainingData& data, const std::string& schedule, double rate_share,
                 const std::vector<InputBank>& banks)
       : sums_(gather_beside(data, schedule, rate_share, banks)) {}
+
+  /// The thresholds that a step may lead to, as `GreyBoxChoice::slips`.
+  using OtherSlips = std::vector<std::uint32_t>(std::uint32_t);
 
   struct Candidate {
     GreyBoxChoice choice;
@@ -72,6 +77,9 @@ class GreyBoxSearch {
   [[nodiscard]] Candidate rated(const GreyBoxChoice& choice) const;
 
  private:
+  /// From a line on, with these steps of the thresholds.
+  [[nodiscard]] Candidate climbed(const GreyBoxChoice& line, OtherSlips* others,
+                                  const Progress& progress) const;
   /// From `best` on, the best of `next(best.choice)` as long as it is worthwhile.
   template <class Next>
   [[nodiscard]] Candidate climbed(Candidate best, double worthwhile, const Next& next,

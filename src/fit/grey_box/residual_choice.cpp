@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <exception>
 #include <limits>
 #include <string_view>
 #include <tuple>
@@ -14,6 +13,8 @@
 #include <vector>
 
 #include "fit/common/folds.hpp"
+#include "fit/common/guards.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/gaussian_process/fit_parametric_gp.hpp"
 #include "fit/grey_box/fit_input_products.hpp"
 #include "fit/mixture/fit_dgmm.hpp"
@@ -126,12 +127,10 @@ ResidualData residual_data(const TrainingData& data, const GreyBox::Parameters& 
 double root_mean_square(const TrainingData& data) {
   double sum = 0.0;
   double count = 0.0;
-  for (const Sequence& sequence : data.sequences)
-    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
-      if (sequence.use[n] == 0) continue;
-      sum += sequence.target[n] * sequence.target[n];
-      ++count;
-    }
+  for_each_usable(data, [&](Features, double target) {
+    sum += target * target;
+    ++count;
+  });
   return std::sqrt(sum / std::max(count, 1.0));
 }
 
@@ -185,16 +184,9 @@ GreyBoxResidual fitted_residual(const ResidualData& left, const Candidate& candi
       residual.model =
           fit_mlp(data, {.layers = {16, 16}, .activation = Activation::tanh}, context).parameters;
   }
-  residual.lowest.assign(data.input_count(), std::numeric_limits<double>::infinity());
-  residual.highest.assign(data.input_count(), -std::numeric_limits<double>::infinity());
-  for (const Sequence& sequence : data.sequences)
-    for (std::size_t n = 0; n < sequence.use.size(); ++n) {
-      if (sequence.use[n] == 0) continue;
-      for (std::size_t j = 0; j < data.input_count(); ++j) {
-        residual.lowest[j] = std::min(residual.lowest[j], sequence.features(n, j));
-        residual.highest[j] = std::max(residual.highest[j], sequence.features(n, j));
-      }
-    }
+  FeatureRanges ranges = feature_ranges(data);
+  residual.lowest = std::move(ranges.lowest);
+  residual.highest = std::move(ranges.highest);
   return residual;
 }
 
@@ -295,7 +287,8 @@ std::array<Gain, kCandidates.size()> tried(const ResidualData& left, const GreyB
     for (std::size_t t = 0; t < trials; ++t) jobs.push_back({c, t});
   }
   std::array<Scores, kCandidates.size()> scores{};
-  std::array<std::exception_ptr, kCandidates.size()> failures{};
+  // One for each job, which run at the same time. A candidate that cannot be fitted is none for these data.
+  std::vector<std::uint8_t> has_failed(jobs.size(), 0);
   ProgressOfParts progress(context.progress, jobs.size());
   for_each_chunk(jobs.size(), 0, [&](std::size_t job) {
     const std::size_t candidate = jobs[job].candidate;
@@ -305,12 +298,13 @@ std::array<Gain, kCandidates.size()> tried(const ResidualData& left, const GreyB
     } catch (const Cancelled&) {
       throw;
     } catch (const Error&) {
-      failures.at(candidate) = std::current_exception();  // it is not a candidate for these data
+      has_failed[job] = 1;
     }
   });
   std::array<Gain, kCandidates.size()> gains{};
-  for (std::size_t c = 0; c < gains.size(); ++c)
-    if (!failures.at(c)) gains.at(c) = gain_of(scores.at(c));
+  for (std::size_t c = 0; c < gains.size(); ++c) gains.at(c) = gain_of(scores.at(c));
+  for (std::size_t job = 0; job < jobs.size(); ++job)
+    if (has_failed[job] != 0) gains.at(jobs[job].candidate) = {};
   return gains;
 }
 
