@@ -13,7 +13,7 @@
 namespace torsio {
 namespace {
 
-constexpr auto kPlace = "arm controller";
+constexpr auto kControllerPlace = "arm controller";
 constexpr double kExchange_s = 0.1;  // decay of the difference between two models
 
 bool is_finite(const JointSample& sample) noexcept {
@@ -50,10 +50,10 @@ ArmController::Axis::Axis(Joint&& from, double sample_rate_Hz, double speed_cuto
       viscous_Nms_rad(from.viscous_Nms_rad),
       largest_external_Nm(from.largest_external_Nm),
       guiding_friction_Nm(from.guiding_friction_Nm) {
-  require_not_negative(kPlace, "the friction of hand guiding", guiding_friction_Nm);
-  require_not_negative(kPlace, "the friction of the bearing", bearing_Nm);
-  require_not_negative(kPlace, "the viscous friction of the bearing", viscous_Nms_rad);
-  require_positive(kPlace, "the largest external torque", largest_external_Nm);
+  require_not_negative(kControllerPlace, "the friction of hand guiding", guiding_friction_Nm);
+  require_not_negative(kControllerPlace, "the friction of the bearing", bearing_Nm);
+  require_not_negative(kControllerPlace, "the viscous friction of the bearing", viscous_Nms_rad);
+  require_positive(kControllerPlace, "the largest external torque", largest_external_Nm);
   if (!monitored) return;
   monitor_inputs.emplace(inputs_of(*monitored));
   monitor_samples.resize(monitored->raw_inputs().size());
@@ -65,21 +65,23 @@ ArmController::ArmController(Settings settings, double sample_rate_Hz)
       dynamics_(settings_.arm),
       observer_(settings_.arm.joints.size(), settings_.observer, sample_rate_Hz),
       reaction_(settings_.reaction_motion, sample_rate_Hz) {
-  require(settings_.joints.size() == dynamics_.size(), kPlace,
+  require(settings_.joints.size() == dynamics_.size(), kControllerPlace,
           fmt::format("{} joints, as in the arm", dynamics_.size()),
           fmt::format("{}", settings_.joints.size()));
-  require_positive(kPlace, "the speed of friction", settings_.friction_speed_rad_s);
-  require_parameter(settings_.friction_share >= 0.0 && settings_.friction_share <= 1.0, kPlace,
-                    "a share of friction from 0 to 1", settings_.friction_share);
-  require_not_negative(kPlace, "the correction of the links", settings_.link_correction_1_s);
-  require_not_negative(kPlace, "the damping of the links", settings_.link_damping);
-  require_positive(kPlace, "the fastest swing", settings_.fastest_swing_rad_s);
-  require_positive(kPlace, "the decay of a guided motion", settings_.guiding_decay_s);
-  require_not_negative(kPlace, "the largest correction", settings_.largest_correction_rad);
-  require_positive(kPlace, "the longest overload", settings_.longest_overload_s);
+  require_positive(kControllerPlace, "the speed of friction", settings_.friction_speed_rad_s);
+  require_parameter(settings_.friction_share >= 0.0 && settings_.friction_share <= 1.0,
+                    kControllerPlace, "a share of friction from 0 to 1", settings_.friction_share);
+  require_not_negative(kControllerPlace, "the correction of the links",
+                       settings_.link_correction_1_s);
+  require_not_negative(kControllerPlace, "the damping of the links", settings_.link_damping);
+  require_positive(kControllerPlace, "the fastest swing", settings_.fastest_swing_rad_s);
+  require_positive(kControllerPlace, "the decay of a guided motion", settings_.guiding_decay_s);
+  require_not_negative(kControllerPlace, "the largest correction",
+                       settings_.largest_correction_rad);
+  require_positive(kControllerPlace, "the longest overload", settings_.longest_overload_s);
   if (settings_.cartesian) cartesian_.emplace(*settings_.cartesian);
   if (settings_.contacts) {
-    require(settings_.contacts->joints.size() == dynamics_.size(), kPlace,
+    require(settings_.contacts->joints.size() == dynamics_.size(), kControllerPlace,
             fmt::format("thresholds of contacts for {} joints, as in the arm", dynamics_.size()),
             fmt::format("{}", settings_.contacts->joints.size()));
     contacts_.emplace(*settings_.contacts, sample_rate_Hz);

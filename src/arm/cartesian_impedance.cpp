@@ -10,7 +10,7 @@
 namespace torsio {
 namespace {
 
-constexpr auto kPlace = "cartesian impedance";
+constexpr auto kImpedancePlace = "cartesian impedance";
 constexpr double kDampedShare = 1e-3;  // part of the most mobile axis that is added to each
 constexpr double kLength_m = 0.5;      // makes rotations and translations comparable
 constexpr double kRounding = 1e-12;
@@ -43,15 +43,17 @@ Vector3 rotation_between(const Matrix3& from, const Matrix3& to) noexcept {
 
 CartesianImpedance::CartesianImpedance(const Settings& settings) : settings_(settings) {
   for (std::size_t axis = 0; axis < 6; ++axis) {
-    require_not_negative(kPlace, "a stiffness", settings.stiffness[axis]);
+    require_not_negative(kImpedancePlace, "a stiffness", settings.stiffness[axis]);
     if (settings.stiffness[axis] > 0.0) rows_[count_++] = axis;
   }
-  require_parameter(count_ > 0, kPlace, "at least one axis with a stiffness above 0", 0.0);
-  require_not_negative(kPlace, "the damping ratio", settings.damping_ratio);
-  require_not_negative(kPlace, "the stiffness of the posture", settings.null_stiffness_Nm_rad);
-  require_not_negative(kPlace, "the damping of the posture", settings.null_damping_Nms_rad);
-  require_positive(kPlace, "the largest force", settings.largest_force_N);
-  require_positive(kPlace, "the largest moment", settings.largest_moment_Nm);
+  require_parameter(count_ > 0, kImpedancePlace, "at least one axis with a stiffness above 0", 0.0);
+  require_not_negative(kImpedancePlace, "the damping ratio", settings.damping_ratio);
+  require_not_negative(kImpedancePlace, "the stiffness of the posture",
+                       settings.null_stiffness_Nm_rad);
+  require_not_negative(kImpedancePlace, "the damping of the posture",
+                       settings.null_damping_Nms_rad);
+  require_positive(kImpedancePlace, "the largest force", settings.largest_force_N);
+  require_positive(kImpedancePlace, "the largest moment", settings.largest_moment_Nm);
 }
 
 struct CartesianImpedance::Task {
