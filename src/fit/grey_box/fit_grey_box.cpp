@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/report_progress.hpp"
 #include "fit/common/held_out.hpp"
+#include "fit/grey_box/box_average.hpp"
 #include "fit/grey_box/grey_box_search.hpp"
 #include "fit/grey_box/late_target.hpp"
 #include "fit/grey_box/residual_choice.hpp"
@@ -37,6 +39,7 @@ struct ChosenBox {
   FittedGreyBox fitted;
   GreyBoxChoice choice = {};
   double spans_rmse = 0.0;
+  std::optional<BoxAverage> average = {};  ///< to be taken instead, if there are no banks
 };
 
 /// Takes the terms of a search, with a note.
@@ -131,6 +134,8 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
                                      search.held_out_error({})));
   if (!options.passive && options.banks && data.input_count() > 1)
     add_banks(box, chosen.choice, data, options, rate_share, progress);
+  if (fitted.parameters.terms.banks.empty())
+    box.average = box_average(search, chosen, data, rate_share);
   // With few strokes every fifth is another part of the motion.
   constexpr std::size_t kLeastStrokes = 20;
   if (search.has_one_record() && fitted.parameters.terms.banks.empty() &&
@@ -140,6 +145,15 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
   }
   fitted.held_out_records = search.held_out_records();
   return box;
+}
+
+void take_average(ChosenBox& box) {
+  if (!box.average) return;
+  box.fitted.parameters = std::move(box.average->parameters);
+  box.fitted.held_out_rmse = box.average->held_out_rmse;
+  box.fitted.notes.push_back(fmt::format(
+      "the average of {} boxes of nearly the same held-out error; held out: RMSE {:.4g}",
+      box.average->boxes, box.average->held_out_rmse));
 }
 
 /// Error bars as wide as the error on the most different part of the data.
@@ -176,10 +190,11 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
   }
   const bool may_learn = options.residual != ResidualKind::none && !options.passive;
   FittedGreyBox& fitted = box.fitted;
-  const double without = fitted.held_out_rmse;
   StrokeErrors strokes;
   if (!fitted.parameters.coefficients.scheduled)
-    strokes = stroke_errors(data, fitted.parameters, box.choice, without);
+    strokes = stroke_errors(data, fitted.parameters, box.choice, fitted.held_out_rmse);
+  take_average(box);
+  const double without = fitted.held_out_rmse;
   if (may_learn) learn_residual(fitted, data, options, context);
   // What a network adds is as good there as elsewhere.
   const double gain = fitted.held_out_rmse / without;

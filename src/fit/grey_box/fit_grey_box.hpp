@@ -21,7 +21,7 @@ enum class ResidualKind : std::uint8_t {
   mlp,        ///< a network of two layers of 16
   dgmm,       ///< a mixture of 50 components
   products,   ///< all products of up to three inputs
-  gp,         ///< a sparse Gaussian process of 32 points
+  gp,         ///< a sparse Gaussian process of 24 points
   automatic,  ///< the one of mlp, products and gp that predicts held-out recordings best, or none
 };
 
@@ -74,7 +74,8 @@ using FittedGreyBox = Fitted<GreyBox>;
 /// time, interpolated over the others; else fifths of interleaved blocks. Every candidate is
 /// evaluated on sums that are computed once (AᵀA of all terms, for each fold), so the search does
 /// not read the data again. Smoothing: λ n Σ (second difference)² over the knots of curve and
-/// forces. Deterministic. Then banks over other inputs are added where they lower the folds' errors in
+/// forces. Deterministic. The average of the boxes that are nearly as good (`box_average`) is taken, if none
+/// has banks. Banks over other inputs are added where they lower the folds' errors in
 /// their geometric mean by a tenth (a fifth on blocks), and the terms of the first input are chosen
 /// again beside them (`GreyBoxSearch::choose_banks`). A bank over a rate is not added where a lag of the
 /// target explains as much (`explained_by_lag`); a note then states the lag.

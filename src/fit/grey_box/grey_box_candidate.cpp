@@ -255,6 +255,14 @@ NormalEquations GreyBoxCandidate::of_level(const std::vector<NormalEquations>& c
   return sum;
 }
 
+NormalEquations GreyBoxCandidate::whole_level(const std::vector<NormalEquations>& cells,
+                                              const std::vector<NormalEquations>& gap,
+                                              std::size_t level) const {
+  NormalEquations sum = of_level(cells, level);
+  if (!gap.empty()) add(sum, gap[level]);
+  return sum;
+}
+
 double GreyBoxCandidate::left_out_levels(const std::vector<NormalEquations>& cells) const {
   Matrix all(sums_.levels, cells[0].columns());
   for (std::size_t level = 0; level < sums_.levels; ++level)
@@ -332,15 +340,45 @@ GreyBox::Parameters GreyBoxCandidate::fitted() const {
   Matrix& values = parameters.coefficients.values;
   values = Matrix(sums_.levels, structure_.columns());
   for (std::size_t level = 0; level < sums_.levels; ++level) {
-    NormalEquations sum = of_level(cells, level);
-    if (!gap.empty()) add(sum, gap[level]);
-    std::vector<double> solution = solved(sum);
+    std::vector<double> solution = solved(whole_level(cells, gap, level));
     for (std::size_t k = 0; k < banks_.size(); ++k)
       if (choice_.banks[banks_[k].place].is_negative)
         for (std::size_t j = 0; j < structure_.banks[k].first_curve(); ++j)
           solution[banks_[k].first + j] = -solution[banks_[k].first + j];
     std::ranges::copy(solution, values.row(level).begin());
   }
+  return parameters;
+}
+
+std::vector<double> GreyBoxCandidate::finest(const std::vector<double>& own) const {
+  std::vector<double> coefficients(sums_.all.columns(), 0.0);
+  for (const ColumnShare& share : map()) coefficients[share.from] += share.factor * own[share.to];
+  return coefficients;
+}
+
+std::vector<double> GreyBoxCandidate::finest_coefficients() const {
+  return finest(solved(whole_level(projected(sums_.cells), projected(sums_.gap), 0)));
+}
+
+std::vector<std::vector<double>> GreyBoxCandidate::finest_of_folds() const {
+  const std::vector<NormalEquations> cells = projected(sums_.cells);
+  const NormalEquations sum = of_level(cells, 0);
+  std::vector<std::vector<double>> of_folds(sums_.folds);
+  for (std::size_t fold = 0; fold < sums_.folds; ++fold) {
+    if (cells[fold].rows == 0 || cells[fold].rows == sum.rows) continue;
+    NormalEquations rest = sum;
+    add(rest, cells[fold], -1.0);
+    of_folds[fold] = finest(solved(rest));
+  }
+  return of_folds;
+}
+
+GreyBox::Parameters GreyBoxCandidate::with(const std::vector<double>& coefficients) const {
+  GreyBox::Parameters parameters{.terms = structure_, .coefficients = sums_.frame, .residual = {}};
+  parameters.coefficients.values = Matrix(1, structure_.columns());
+  // At a knot of its own, a coarse hat has the value of the fine one.
+  for (const ColumnShare& share : map())
+    if (share.factor == 1.0) parameters.coefficients.values(0, share.to) = coefficients[share.from];
   return parameters;
 }
 

@@ -47,6 +47,13 @@ class GreyBoxCandidate {
   /// Fitted to all data.
   [[nodiscard]] GreyBox::Parameters fitted() const;
 
+  /// The fit to all data, as coefficients of the finest terms, of a single level.
+  [[nodiscard]] std::vector<double> finest_coefficients() const;
+  /// The same of the fits to all but one fold each; empty: that of a fold without samples.
+  [[nodiscard]] std::vector<std::vector<double>> finest_of_folds() const;
+  /// A box of these terms. @param coefficients of the finest terms: a function that these terms can represent
+  [[nodiscard]] GreyBox::Parameters with(const std::vector<double>& coefficients) const;
+
  private:
   /// A bank that has terms.
   struct Bank {
@@ -54,6 +61,8 @@ class GreyBoxCandidate {
     std::size_t first = 0;  ///< column
   };
 
+  /// As coefficients of the finest terms.
+  [[nodiscard]] std::vector<double> finest(const std::vector<double>& own) const;
   [[nodiscard]] std::vector<double> solved(const NormalEquations& equations) const;
   [[nodiscard]] std::vector<NormalEquations> projected(
       const std::vector<NormalEquations>& all) const;
@@ -62,6 +71,10 @@ class GreyBoxCandidate {
   /// The terms of the candidate as sums of all terms.
   [[nodiscard]] std::vector<ColumnShare> map() const;
   void add_main_columns(std::vector<ColumnShare>& shares) const;
+  /// All samples of a level, those in a gap as well.
+  [[nodiscard]] NormalEquations whole_level(const std::vector<NormalEquations>& cells,
+                                            const std::vector<NormalEquations>& gap,
+                                            std::size_t level) const;
   [[nodiscard]] NormalEquations of_level(const std::vector<NormalEquations>& cells,
                                          std::size_t level) const;
 

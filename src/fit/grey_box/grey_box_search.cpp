@@ -7,8 +7,10 @@
 #include <bit>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "core/report_progress.hpp"
+#include "numerics/parallel.hpp"
 
 namespace torsio {
 namespace {
@@ -83,6 +85,25 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates,
     });
   if (has_rates && !at.has_viscous) with([](auto& c) { c.has_viscous = true; });
   if (has_rates && !at.has_coulomb) with([](auto& c) { c.has_coulomb = true; });
+  return next;
+}
+
+/// One step down any sequence, also two of the knots. Fewer thresholds are among the steps up.
+std::vector<GreyBoxChoice> steps_down(const GreyBoxChoice& at) {
+  std::vector<GreyBoxChoice> next;
+  const auto with = [&](auto change) {
+    GreyBoxChoice candidate = at;
+    change(candidate);
+    next.push_back(candidate);
+  };
+  for (std::size_t by = 1; by <= 2; ++by) {
+    if (at.curve >= by) with([by](auto& c) { c.curve -= by; });
+    if (at.forces >= by) with([by](auto& c) { c.forces -= by; });
+  }
+  if (at.branches > 0) with([](auto& c) { --c.branches; });
+  if (at.smoothing < GreyBoxChoice{}.smoothing) with([](auto& c) { ++c.smoothing; });
+  if (at.has_viscous) with([](auto& c) { c.has_viscous = false; });
+  if (at.has_coulomb) with([](auto& c) { c.has_coulomb = false; });
   return next;
 }
 
@@ -175,8 +196,7 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose(const GreyBoxChoice& line,
 
 GreyBoxSearch::Candidate GreyBoxSearch::climbed(const GreyBoxChoice& line, OtherSlips* others,
                                                 const Progress& progress) const {
-  const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
-  const auto next = [&](const GreyBoxChoice& at) { return steps_up(at, has_rates, others); };
+  const auto next = [&](const GreyBoxChoice& at) { return steps_up(at, has_rates(), others); };
   return climbed(rated(line), kWorthwhile, next, progress);
 }
 
@@ -185,6 +205,22 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose_thresholds(const Candidate& sprea
   const Candidate chosen =
       climbed({.is_passive = spread.choice.is_passive}, other_thresholds, progress);
   return chosen.score < kThresholdsTogether * spread.score ? chosen : spread;
+}
+
+bool GreyBoxSearch::has_rates() const {
+  return std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
+}
+
+std::vector<GreyBoxSearch::Candidate> GreyBoxSearch::neighbours(const GreyBoxChoice& at) const {
+  const bool is_spread = std::ranges::find(kSpreads, at.slips) != kSpreads.end();
+  std::vector<GreyBoxChoice> choices =
+      steps_up(at, has_rates(), is_spread ? other_spreads : other_thresholds);
+  for (GreyBoxChoice& down : steps_down(at)) choices.push_back(std::move(down));
+  std::erase_if(choices,
+                [&](const GreyBoxChoice& c) { return !GreyBoxCandidate(sums_, c).is_possible(); });
+  std::vector<Candidate> rated_choices(choices.size());
+  for_each_chunk(choices.size(), 0, [&](std::size_t i) { rated_choices[i] = rated(choices[i]); });
+  return rated_choices;
 }
 
 const char* GreyBoxSearch::what_was_held_out() const {

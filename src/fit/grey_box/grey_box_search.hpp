@@ -76,7 +76,13 @@ class GreyBoxSearch {
   /// errors of another size, and the largest shall not choose the banks alone.
   [[nodiscard]] Candidate rated(const GreyBoxChoice& choice) const;
 
+  /// What is one step of any sequence away, up or down, from terms without banks.
+  [[nodiscard]] std::vector<Candidate> neighbours(const GreyBoxChoice& at) const;
+
+  [[nodiscard]] const GreyBoxSums& sums() const noexcept { return sums_; }
+
  private:
+  [[nodiscard]] bool has_rates() const;
   /// From a line on, with these steps of the thresholds.
   [[nodiscard]] Candidate climbed(const GreyBoxChoice& line, OtherSlips* others,
                                   const Progress& progress) const;

@@ -269,6 +269,11 @@ GreyBoxSums gather_strokes(const TrainingData& data, const GreyBoxTerms::Structu
   return sums;
 }
 
+GreyBoxSums gather_strokes(const TrainingData& data, double rate_share,
+                           const StrokeKinds& strokes) {
+  return sums_of(data, {}, finest(data, rate_share), false, false, &strokes);
+}
+
 GreyBoxSums gather_beside(const TrainingData& data, const std::string& schedule, double rate_share,
                           const std::vector<InputBank>& banks) {
   GreyBoxTerms::Structure all = finest(data, rate_share);

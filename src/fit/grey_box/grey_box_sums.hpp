@@ -70,6 +70,10 @@ struct GreyBoxSums {
                                          const GreyBoxTerms::Structure& chosen,
                                          const StrokeKinds& strokes);
 
+/// Sums over every term of the first input, with groups of strokes as folds. @param rate_share as `gather` takes it
+[[nodiscard]] GreyBoxSums gather_strokes(const TrainingData& data, double rate_share,
+                                         const StrokeKinds& strokes);
+
 /// As `gather`, beside banks that have been chosen, with the gaps of `gather_banks`.
 [[nodiscard]] GreyBoxSums gather_beside(const TrainingData& data, const std::string& schedule,
                                         double rate_share, const std::vector<InputBank>& banks);

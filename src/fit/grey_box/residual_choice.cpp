@@ -162,7 +162,7 @@ std::string text_of(const Candidate& candidate) {
 /// Only values: the error bar is that of the held-out errors.
 ParametricGp::Parameters fitted_gp(const TrainingData& data, const FitContext& context) {
   const VariationalGpOptions options{
-      .kernel = "se_ard", .inducing_points = 32, .samples = 1500, .iterations = 40};
+      .kernel = "se_ard", .inducing_points = 24, .samples = 1500, .iterations = 40};
   ParametricGp::Parameters parameters = fit_variational_gp(data, options, context).parameters;
   parameters.explained = {};
   return parameters;
