@@ -26,7 +26,8 @@ GreyBoxChoice joined(const GreyBoxChoice& a, const GreyBoxChoice& b) {
 }
 
 bool has_no_other_kind_of_term(const GreyBoxChoice& choice, const GreyBoxChoice& than) {
-  return choice.branches <= than.branches && choice.is_signed <= than.is_signed &&
+  return (choice.curve == 0 || than.curve > 0) && (choice.slips == 0 || than.slips != 0) &&
+         choice.branches <= than.branches && choice.is_signed <= than.is_signed &&
          choice.has_viscous <= than.has_viscous && choice.has_coulomb <= than.has_coulomb;
 }
 

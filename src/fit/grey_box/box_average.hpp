@@ -19,7 +19,7 @@ struct BoxAverage {
 ///
 /// coefficients = Σ w_k c_k / Σ w_k over the knots, thresholds and time constants of all of them, w_k = e_k^-64, with e_k the
 /// error of box k on the longest strokes of the training, predicted from the shorter ones; w_k = 1 where the strokes last
-/// equally long. No box that relaxes, or is signed, where the chosen one is not.
+/// equally long. No box bends, slips, relaxes or is signed where the chosen one does not: a linear spring remains one.
 /// @param rate_share as the search was given it
 /// @returns nothing for a schedule, or if no other box is nearly as good.
 [[nodiscard]] std::optional<BoxAverage> box_average(const GreyBoxSearch& search,
