@@ -26,9 +26,10 @@ GreyBoxChoice joined(const GreyBoxChoice& a, const GreyBoxChoice& b) {
 }
 
 bool has_no_other_kind_of_term(const GreyBoxChoice& choice, const GreyBoxChoice& than) {
-  return (choice.curve == 0 || than.curve > 0) && (choice.slips == 0 || than.slips != 0) &&
-         choice.branches <= than.branches && choice.is_signed <= than.is_signed &&
-         choice.has_viscous <= than.has_viscous && choice.has_coulomb <= than.has_coulomb;
+  const auto adds = [](bool has, bool had) { return has && !had; };
+  return choice.branches <= than.branches && !adds(choice.curve > 0, than.curve > 0) &&
+         !adds(choice.slips != 0, than.slips != 0) && !adds(choice.is_signed, than.is_signed) &&
+         !adds(choice.has_viscous, than.has_viscous) && !adds(choice.has_coulomb, than.has_coulomb);
 }
 
 /// The boxes to average, and the terms of all of them.
