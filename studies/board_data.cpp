@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <iterator>
 #include <utility>
 
@@ -128,9 +130,14 @@ std::string left_out(const BoardSource& source, const std::string& folder) {
   const std::string missing =
       folder.empty() ? fmt::format("{}/", source.folder) : missing_file(source, folder);
   if (missing.empty()) return {};
+  const char* const variable = std::getenv("TORSIO_DATA");
+  const std::string state = variable == nullptr ? "not set"
+                            : std::filesystem::is_directory(variable)
+                                ? variable
+                                : fmt::format("{}, which is not a folder", variable);
   return fmt::format("{} is missing: fetch it from {}, and put it into {}/{} (TORSIO_DATA is {})",
                      missing, source.address, folder.empty() ? "$TORSIO_DATA" : folder,
-                     source.folder, folder.empty() ? "not set" : folder);
+                     source.folder, state);
 }
 
 ComparisonCase board_case(const BoardSet& set, const Progress& progress) {

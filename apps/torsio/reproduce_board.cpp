@@ -5,8 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -34,6 +38,29 @@ std::vector<torsio::BoardRow> known_rows() {
   std::vector<torsio::BoardRow> rows = torsio::recorded_board_rows();
   std::ranges::move(torsio::published_board_rows(), std::back_inserter(rows));
   return rows;
+}
+
+/// Refuses to replace a file of rows by one without those that were added to it since this program was built.
+void require_its_rows(const std::string& file, const std::vector<torsio::BoardRow>& rows) {
+  std::ifstream stream(file);
+  const std::string text = torsio::board_rows_csv(rows);
+  std::string line;
+  // Another file, or none, is replaced as that of any -o.
+  if (!std::getline(stream, line) || line != text.substr(0, text.find('\n'))) return;
+  const auto key_of = [](const std::string& row) {
+    return row.substr(0, row.find(',', row.find(',') + 1));
+  };
+  std::set<std::string> known;
+  std::istringstream own(text);
+  while (std::getline(own, line)) known.insert(key_of(line));
+  for (std::size_t number = 2; std::getline(stream, line); ++number)
+    if (!line.empty() && !known.contains(key_of(line)))
+      throw torsio::Error({.place = fmt::format("{}:{}", file, number),
+                           .problem = "this program does not have the row, which would be lost",
+                           .found = line,
+                           .advice =
+                               "Build the program again: it reads studies/board_rows.csv when it "
+                               "is built. Or write to another file."});
 }
 
 nlohmann::ordered_json board_json(const torsio::BoardSet& set,
@@ -100,6 +127,7 @@ void score_predictions(const BoardFlags& flags, const JsonOutput& json) {
 
 void show_recorded(const BoardFlags& flags, const std::string& page, const JsonOutput& json) {
   const std::vector<torsio::BoardRow> rows = known_rows();
+  if (!flags.rows.empty()) require_its_rows(flags.rows, rows);
   if (!flags.rows.empty()) write_text(flags.rows, torsio::board_rows_csv(rows));
   if (!page.empty()) write_text(page, torsio::board_page(rows));
   if (!flags.rows.empty() || !page.empty()) return;
@@ -112,6 +140,7 @@ void show_recorded(const BoardFlags& flags, const std::string& page, const JsonO
 void run_all(const BoardFlags& flags, const torsio::StudyOptions& options, const std::string& page,
              const JsonOutput& json) {
   if (options.is_quick) refuse_board("--quick", "a page needs the full run");
+  if (!flags.rows.empty()) require_its_rows(flags.rows, known_rows());
   ProgressBar progress;
   const torsio::BoardRun run = torsio::run_board(options, progress.listener());
   const torsio::StudyInfo& info = torsio::find_study(kBoard);

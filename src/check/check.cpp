@@ -185,7 +185,8 @@ std::vector<std::string> Checker::computed_from() const {
   if (dataset_.records.empty()) return found;
   const Recording& first = dataset_.records.front().recording;
   for (const Channel& channel : first.channels())
-    if (may_be_target(first, channel) &&
+    // A force on a lever was measured as well as a torque.
+    if (may_be_target(first, channel) && !channel.name.ends_with("_N") &&
         std::ranges::all_of(
             dataset_.records,
             [&](const DatasetRecord& record) { return record.recording.has(channel.name); }) &&

@@ -25,7 +25,8 @@ double percent(const YamlValue& value, std::string_view of) {
   if (!all.ends_with('%'))
     value.refuse(fmt::format("a share of the {} in %, as 0.2%", of),
                  all.find_first_not_of("0123456789.") == std::string_view::npos
-                     ? fmt::format("Write {}% if percent are meant, as a class is.", all)
+                     ? fmt::format("Write {:g}% for a share of {}, or {}% if {} are percent.",
+                                   100.0 * si_quantity(all, "1", value.place()), all, all, all)
                      : "");
   const double number = si_quantity(all.substr(0, all.size() - 1), "1", value.place());
   if (!(number >= 0.0 && number < 100.0))

@@ -151,22 +151,27 @@ void take_average(ChosenBox& box) {
   if (!box.average) return;
   box.fitted.parameters = std::move(box.average->parameters);
   box.fitted.held_out_rmse = box.average->held_out_rmse;
-  box.fitted.notes.push_back(fmt::format(
-      "the average of {} boxes of nearly the same held-out error; held out: RMSE {:.4g}",
-      box.average->boxes, box.average->held_out_rmse));
+  box.fitted.notes.push_back(
+      fmt::format("the average of this model and {} whose held-out errors are about as low; held "
+                  "out: RMSE {:.4g}",
+                  box.average->boxes - 1, box.average->held_out_rmse));
 }
 
 /// Error bars as wide as the error on the most different part of the data.
 void widen(ChosenBox& box, const StrokeErrors& strokes) {
+  const char* widest = nullptr;
   const auto to = [&](double rmse, const char* of) {
     if (!(rmse > box.fitted.held_out_rmse)) return;
     box.fitted.held_out_rmse = rmse;
-    box.fitted.notes.push_back(
-        fmt::format("error bars are those of held-out {}: RMSE {:.4g}", of, rmse));
+    widest = of;
   };
   to(box.spans_rmse, "contiguous fifths");
   // Whole recordings that were held out already contain strokes of all durations.
   if (box.fitted.held_out_records < kSeveralRecords) to(strokes.rmse, "strokes of other durations");
+  if (widest != nullptr)
+    box.fitted.notes.push_back(fmt::format(
+        "without a validation recording, error bars are those of held-out {}: RMSE {:.4g}", widest,
+        box.fitted.held_out_rmse));
   box.fitted.stroke_growth = strokes.growth;
 }
 

@@ -102,8 +102,16 @@ std::vector<GreyBoxChoice> steps_down(const GreyBoxChoice& at) {
   }
   if (at.branches > 0) with([](auto& c) { --c.branches; });
   if (at.smoothing < GreyBoxChoice{}.smoothing) with([](auto& c) { ++c.smoothing; });
+  if (at.is_signed) with([](auto& c) { c.is_signed = false; });
   if (at.has_viscous) with([](auto& c) { c.has_viscous = false; });
   if (at.has_coulomb) with([](auto& c) { c.has_coulomb = false; });
+  return next;
+}
+
+std::vector<GreyBoxChoice> steps(const GreyBoxChoice& at, bool has_rates,
+                                 GreyBoxSearch::OtherSlips* others) {
+  std::vector<GreyBoxChoice> next = steps_up(at, has_rates, others);
+  for (GreyBoxChoice& down : steps_down(at)) next.push_back(std::move(down));
   return next;
 }
 
@@ -196,7 +204,11 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose(const GreyBoxChoice& line,
 
 GreyBoxSearch::Candidate GreyBoxSearch::climbed(const GreyBoxChoice& line, OtherSlips* others,
                                                 const Progress& progress) const {
-  const auto next = [&](const GreyBoxChoice& at) { return steps_up(at, has_rates(), others); };
+  // Two or three records seldom determine which of many structures describes another motion: with further steps the
+  // errors there rose as often as they fell.
+  const auto next = [&](const GreyBoxChoice& at) {
+    return sums_.is_by_record ? steps_up(at, has_rates(), others) : steps(at, has_rates(), others);
+  };
   return climbed(rated(line), kWorthwhile, next, progress);
 }
 
@@ -214,8 +226,7 @@ bool GreyBoxSearch::has_rates() const {
 std::vector<GreyBoxSearch::Candidate> GreyBoxSearch::neighbours(const GreyBoxChoice& at) const {
   const bool is_spread = std::ranges::find(kSpreads, at.slips) != kSpreads.end();
   std::vector<GreyBoxChoice> choices =
-      steps_up(at, has_rates(), is_spread ? other_spreads : other_thresholds);
-  for (GreyBoxChoice& down : steps_down(at)) choices.push_back(std::move(down));
+      steps(at, has_rates(), is_spread ? other_spreads : other_thresholds);
   std::erase_if(choices,
                 [&](const GreyBoxChoice& c) { return !GreyBoxCandidate(sums_, c).is_possible(); });
   std::vector<Candidate> rated_choices(choices.size());
