@@ -657,6 +657,7 @@ TEST(Mapping, RefusesUncertaintiesThatMeanNothing) {
   EXPECT_THAT(message("class: 0.2, range: 100Nm"), HasSubstr("Write 0.2%"));
   EXPECT_THAT(message("class: CLASS, range: RANGE"), HasSubstr("found 'CLASS'"));
   EXPECT_THAT(message("class: CLASS, range: RANGE"), testing::Not(HasSubstr("CLASS%")));
+  EXPECT_THAT(message("gain: 0.005"), HasSubstr("Write 0.5% for a share of 0.005, or 0.005%."));
   EXPECT_THAT(message("gain: 0.5Nm"), HasSubstr("a share of the reading in %"));
   EXPECT_THAT(message("gain: -1%"), HasSubstr("from 0% to below 100%"));
   EXPECT_THAT(message("gain: 100%"), HasSubstr("from 0% to below 100%"));

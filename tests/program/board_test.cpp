@@ -29,6 +29,13 @@ TEST_F(BoardCalls, ShowTheRecordedTablesWithoutRecordings) {
                                         HasSubstr("\"measure\": \"mean |error|\"")));
 }
 
+TEST_F(BoardCalls, StateThatTheirFolderIsNone) {
+  const Outcome outcome =
+      shell("TORSIO_DATA=/nowhere {torsio} reproduce board --set emps --template t.csv");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed);
+  EXPECT_THAT(outcome.err, HasSubstr("TORSIO_DATA is /nowhere, which is not a folder"));
+}
+
 TEST_F(BoardCalls, StateWhereMissingRecordingsBelong) {
   std::ofstream(folder_.path("mine.csv"))
       << "set,recording,sample,prediction_m\nemps,emps_val,20,0\n";
@@ -70,6 +77,19 @@ TEST_F(BoardCalls, WriteTheRecordedRowsAndThePage) {
   };
   EXPECT_EQ(contents("r.csv"), repository_file("studies/board_rows.csv"));
   EXPECT_EQ(contents("p.md"), repository_file("docs/board.md"));
+}
+
+TEST_F(BoardCalls, KeepRowsThatWereAddedSinceTheProgramWasBuilt) {
+  ASSERT_EQ(torsio("reproduce board --recorded --rows r.csv").exit_code, 0);
+  const std::string with_row =
+      contents("r.csv") + "emps,mine,joined,0.001,,1,https://example.org\n";
+  std::ofstream(folder_.path("r.csv")) << with_row;
+  const Outcome outcome = torsio("reproduce board --recorded --rows r.csv --page p.md");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("r.csv:"), HasSubstr("found emps,mine,joined"),
+                                 HasSubstr("Build the program again")));
+  EXPECT_EQ(contents("r.csv"), with_row);
+  EXPECT_FALSE(std::filesystem::exists(folder_.path("p.md")));
 }
 
 TEST_F(BoardCalls, WithUnusablePredictionsNameTheLine) {

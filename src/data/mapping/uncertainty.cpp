@@ -18,16 +18,21 @@ namespace {
 
 constexpr double kLargestReading = 1e12;  // in the SI unit of the channel
 
+/// What to write for a share without %. A class is stated in percent, also where it is written as a bare number.
+std::string advice_for(std::string_view share, std::string_view of, const std::string& place) {
+  if (share.find_first_not_of("0123456789.") != std::string_view::npos) return "";
+  if (of == "range") return fmt::format("Write {}% for class {}.", share, share);
+  return fmt::format("Write {:g}% for a share of {}, or {}%.",
+                     100.0 * si_quantity(share, "1", place), share, share);
+}
+
 /// "0.5%" as 0.5.
 double percent(const YamlValue& value, std::string_view of) {
   const std::string text = value.text();
   const std::string_view all = trimmed(text);
   if (!all.ends_with('%'))
     value.refuse(fmt::format("a share of the {} in %, as 0.2%", of),
-                 all.find_first_not_of("0123456789.") == std::string_view::npos
-                     ? fmt::format("Write {:g}% for a share of {}, or {}% if {} are percent.",
-                                   100.0 * si_quantity(all, "1", value.place()), all, all, all)
-                     : "");
+                 advice_for(all, of, value.place()));
   const double number = si_quantity(all.substr(0, all.size() - 1), "1", value.place());
   if (!(number >= 0.0 && number < 100.0))
     value.refuse(fmt::format("a share of the {}, from 0% to below 100%", of));
