@@ -29,13 +29,6 @@ TEST_F(BoardCalls, ShowTheRecordedTablesWithoutRecordings) {
                                         HasSubstr("\"measure\": \"mean |error|\"")));
 }
 
-TEST_F(BoardCalls, StateThatTheirFolderIsNone) {
-  const Outcome outcome =
-      shell("TORSIO_DATA=/nowhere {torsio} reproduce board --set emps --template t.csv");
-  EXPECT_EQ(outcome.exit_code, kWorkFailed);
-  EXPECT_THAT(outcome.err, HasSubstr("TORSIO_DATA is /nowhere, which is not a folder"));
-}
-
 TEST_F(BoardCalls, StateWhereMissingRecordingsBelong) {
   std::ofstream(folder_.path("mine.csv"))
       << "set,recording,sample,prediction_m\nemps,emps_val,20,0\n";
