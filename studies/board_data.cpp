@@ -130,6 +130,7 @@ std::string left_out(const BoardSource& source, const std::string& folder) {
   const std::string missing =
       folder.empty() ? fmt::format("{}/", source.folder) : missing_file(source, folder);
   if (missing.empty()) return {};
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): the environment is not written
   const char* const variable = std::getenv("TORSIO_DATA");
   const std::string state = variable == nullptr ? "not set"
                             : std::filesystem::is_directory(variable)
