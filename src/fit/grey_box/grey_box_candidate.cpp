@@ -247,6 +247,14 @@ std::vector<double> GreyBoxCandidate::solved(const NormalEquations& equations) c
   return {solution.begin(), solution.end()};
 }
 
+std::vector<double> GreyBoxCandidate::solved_without(const NormalEquations& fold,
+                                                     const NormalEquations& all) const {
+  if (fold.rows == 0 || fold.rows == all.rows) return {};
+  NormalEquations rest = all;
+  add(rest, fold, -1.0);
+  return solved(rest);
+}
+
 NormalEquations GreyBoxCandidate::of_level(const std::vector<NormalEquations>& cells,
                                            std::size_t level) const {
   NormalEquations sum(cells[0].columns());
@@ -299,10 +307,8 @@ GreyBoxCandidate::HeldOut GreyBoxCandidate::left_out_folds(
     const NormalEquations sum = of_level(cells, level);
     for (std::size_t fold = 0; fold < sums_.folds; ++fold) {
       const NormalEquations& out = cells[level * sums_.folds + fold];
-      if (out.rows == 0 || out.rows == sum.rows) continue;
-      NormalEquations rest = sum;
-      add(rest, out, -1.0);
-      const std::vector<double> coefficients = solved(rest);
+      const std::vector<double> coefficients = solved_without(out, sum);
+      if (coefficients.empty()) continue;
       folds[fold].error += out.error(coefficients);
       folds[fold].rows += out.rows;
       if (beyond.empty()) continue;
@@ -365,10 +371,8 @@ std::vector<std::vector<double>> GreyBoxCandidate::finest_of_folds() const {
   const NormalEquations sum = of_level(cells, 0);
   std::vector<std::vector<double>> of_folds(sums_.folds);
   for (std::size_t fold = 0; fold < sums_.folds; ++fold) {
-    if (cells[fold].rows == 0 || cells[fold].rows == sum.rows) continue;
-    NormalEquations rest = sum;
-    add(rest, cells[fold], -1.0);
-    of_folds[fold] = finest(solved(rest));
+    const std::vector<double> coefficients = solved_without(cells[fold], sum);
+    if (!coefficients.empty()) of_folds[fold] = finest(coefficients);
   }
   return of_folds;
 }

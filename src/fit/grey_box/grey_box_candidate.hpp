@@ -64,6 +64,9 @@ class GreyBoxCandidate {
   /// As coefficients of the finest terms.
   [[nodiscard]] std::vector<double> finest(const std::vector<double>& own) const;
   [[nodiscard]] std::vector<double> solved(const NormalEquations& equations) const;
+  /// Fitted to all samples but those of a fold; empty if it has none, or all.
+  [[nodiscard]] std::vector<double> solved_without(const NormalEquations& fold,
+                                                   const NormalEquations& all) const;
   [[nodiscard]] std::vector<NormalEquations> projected(
       const std::vector<NormalEquations>& all) const;
   [[nodiscard]] double left_out_levels(const std::vector<NormalEquations>& cells) const;

@@ -51,16 +51,18 @@ std::vector<std::uint32_t> other_thresholds(std::uint32_t at) {
   return others;
 }
 
+/// A function that adds to `next` what a change makes of `at`.
+template <class Choice>
+auto adding_changed(const Choice& at, std::vector<Choice>& next) {
+  return [&at, &next](auto change) { change(next.emplace_back(at)); };
+}
+
 /// One step up any sequence from `at`.
 /// @param others thresholds of the slip elements: `other_spreads` or `other_thresholds`
 std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates,
                                     GreyBoxSearch::OtherSlips* others) {
   std::vector<GreyBoxChoice> next;
-  const auto with = [&](auto change) {
-    GreyBoxChoice candidate = at;
-    change(candidate);
-    next.push_back(candidate);
-  };
+  const auto with = adding_changed(at, next);
   // Two at a time as well: three knots show nothing of a curve that stiffens both ways alike.
   for (std::size_t by = 1; by <= 2; ++by) {
     if (at.curve + by <= GreyBoxSums::kFinest) with([by](auto& c) { c.curve += by; });
@@ -91,11 +93,7 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates,
 /// One step down any sequence, also two of the knots. Fewer thresholds are among the steps up.
 std::vector<GreyBoxChoice> steps_down(const GreyBoxChoice& at) {
   std::vector<GreyBoxChoice> next;
-  const auto with = [&](auto change) {
-    GreyBoxChoice candidate = at;
-    change(candidate);
-    next.push_back(candidate);
-  };
+  const auto with = adding_changed(at, next);
   for (std::size_t by = 1; by <= 2; ++by) {
     if (at.curve >= by) with([by](auto& c) { c.curve -= by; });
     if (at.forces >= by) with([by](auto& c) { c.forces -= by; });
@@ -118,11 +116,7 @@ std::vector<GreyBoxChoice> steps(const GreyBoxChoice& at, bool has_rates,
 /// One step up any sequence of one bank.
 std::vector<BankChoice> steps_up(const BankChoice& at, bool may_slip) {
   std::vector<BankChoice> next;
-  const auto with = [&](auto change) {
-    BankChoice candidate = at;
-    change(candidate);
-    next.push_back(candidate);
-  };
+  const auto with = adding_changed(at, next);
   for (std::size_t by = 1; by <= 2; ++by) {
     if (at.slips == 0 && may_slip) {
       // Which way the torque acts on this input is not known.
