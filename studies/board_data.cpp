@@ -132,7 +132,7 @@ std::string left_out(const BoardSource& source, const std::string& folder) {
   if (missing.empty()) return {};
   // NOLINTNEXTLINE(concurrency-mt-unsafe): the environment is not written
   const char* const variable = std::getenv("TORSIO_DATA");
-  const std::string state = variable == nullptr ? "not set"
+  const std::string state = variable == nullptr || *variable == '\0' ? "not set"
                             : std::filesystem::is_directory(variable)
                                 ? variable
                                 : fmt::format("{}, which is not a folder", variable);
