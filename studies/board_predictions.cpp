@@ -94,6 +94,12 @@ class PredictionReader {
 
   [[nodiscard]] std::size_t required(std::string_view column, std::size_t line) const {
     if (const auto found = find(column)) return *found;
+    if (header_.size() == 1 && header_.front().find(';') != std::string::npos)
+      throw Error({.place = place(line),
+                   .problem = "the fields are separated by semicolons",
+                   .expected = "commas, and a point as decimal separator",
+                   .found = header_.front(),
+                   .advice = std::string(kAdvice)});
     throw Error({.place = place(line),
                  .problem = fmt::format("the column {} is missing", column),
                  .expected = "set, recording, sample (or t_s), prediction_UNIT",
@@ -160,8 +166,11 @@ class PredictionReader {
                                              "a whole number from 0", number);
     else
       sample.t_s = number_in<double>(fields[*columns_.time], "t_s", "a number", number);
-    sample.value = number_in<double>(fields[columns_.prediction], "prediction_" + columns_.unit,
-                                     "a number", number);
+    // Empty where there is no prediction: required of scored samples alone.
+    const std::string_view prediction = fields[columns_.prediction];
+    sample.value = prediction.empty() ? kNotMeasured
+                                      : number_in<double>(prediction, "prediction_" + columns_.unit,
+                                                          "a number", number);
   }
 
   std::string_view text_;
@@ -263,12 +272,12 @@ std::vector<std::vector<double>> matched_predictions(const PredictionFile& file,
                    .problem = fmt::format("sample {} of {} is predicted twice, first in line {}",
                                           sample, predicted.recording, lines[k][n])});
     if (!std::isfinite(predicted.value))
-      throw Error({.place = fmt::format("{}: line {}", file.file, predicted.line),
-                   .problem = fmt::format("the prediction of a scored sample ({} of {}) is not "
-                                          "finite",
-                                          sample, predicted.recording),
-                   .expected = "a finite number for every scored sample",
-                   .found = fmt::format("{}", predicted.value)});
+      throw Error(
+          {.place = fmt::format("{}: line {}", file.file, predicted.line),
+           .problem = fmt::format("the prediction of a scored sample ({} of {}) is empty or "
+                                  "not finite",
+                                  sample, predicted.recording),
+           .expected = "a finite number for every scored sample"});
     lines[k][n] = predicted.line;
     values[k][n] = predicted.value;
   }

@@ -204,8 +204,15 @@ void write_plot(const std::string& path, const torsio::StudyOutcome& outcome) {
 void run(const ReproduceFlags& flags) {
   if (flags.list) return list(flags);
   if (flags.board.is_used() ||
-      (!flags.page.empty() && flags.items == std::vector<std::string>{"board"}))
+      (!flags.page.empty() && flags.items == std::vector<std::string>{"board"})) {
+    if (flags.report.is_wanted() || !flags.plot.empty())
+      throw torsio::UsageError(
+          {.place = "torsio reproduce --report and --plot",
+           .problem = "they show the run of an experiment, and the options of the item board write "
+                      "tables or files instead",
+           .advice = "Leave them away; --page writes docs/board.md."});
     return reproduce_board(flags.board, flags.items, flags.options, flags.page, flags.json);
+  }
   if (!flags.page.empty())
     throw torsio::UsageError({.place = "torsio reproduce --page",
                               .problem = "it needs --list, or the item board alone"});

@@ -141,6 +141,21 @@ std::optional<std::string> expanded(std::string text) {
   return text;
 }
 
+/// The variable at the beginning of a root: set to something else than a folder it is a mistake, which the next root
+/// would hide.
+void require_folder_of_variable(const std::string& root) {
+  if (!root.starts_with("${")) return;
+  const std::string variable = root.substr(0, root.find('}') + 1);
+  const auto folder = expanded(variable);
+  std::error_code ignored;
+  if (!folder || std::filesystem::is_directory(*folder, ignored)) return;
+  const std::string name = variable.substr(2, variable.size() - 3);
+  throw Error({.place = "the environment variable " + name,
+               .problem = "it does not name a folder",
+               .found = *folder,
+               .advice = "Correct it, or unset it:  unset " + name});
+}
+
 }  // namespace
 
 Manifest read_manifest(const std::string& path, const Progress& progress) {
@@ -157,6 +172,7 @@ std::string data_folder(const Manifest& manifest) {
   for (const std::string& root : manifest.roots) {
     const auto folder = expanded(root);
     if (!folder) continue;
+    require_folder_of_variable(root);
     std::error_code ignored;
     if (std::filesystem::is_directory(own / *folder, ignored)) return (own / *folder).string();
   }

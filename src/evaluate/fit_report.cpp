@@ -126,6 +126,34 @@ std::vector<double> correlations(const std::vector<Run>& runs, const Value& valu
   return products;
 }
 
+/// How the autocorrelation decays.
+struct Decay {
+  double lags_to_1e = kNotMeasured;  ///< the first lag below 1/e; NaN if there is none
+  double sum = 0.0;                  ///< over the lags from 1 on, up to the first r_k <= 0
+};
+
+/// @param own r_k of the first lags. Where they do not reach 0, longer lags, up to a tenth of the longest recording, have a
+/// wider step.
+Decay decay_of(const std::vector<Run>& runs, std::vector<double> own, std::size_t stride,
+               std::size_t longest) {
+  const auto is_below_0 = [](double r) { return r <= 0.0; };
+  std::size_t step = 1;
+  while (std::ranges::none_of(own, is_below_0) && own.size() * step < longest / 10) {
+    step *= 2;
+    const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
+    own = correlations(runs, residual, std::min(kMaxLags, longest / 10 / step + 1), step * stride);
+  }
+  const auto forgotten = std::ranges::find_if(own, [](double r) { return r < std::exp(-1.0); });
+  const auto end = std::max(std::ranges::find_if(own, is_below_0), own.begin() + 1);
+  Decay decay;
+  if (forgotten != own.end())
+    decay.lags_to_1e =
+        static_cast<double>((forgotten - own.begin()) * static_cast<std::ptrdiff_t>(step));
+  // The trapezoidal rule, which for a step of 1 is the sum.
+  decay.sum = static_cast<double>(step) * (std::accumulate(own.begin() + 1, end, 0.0) + 0.5) - 0.5;
+  return decay;
+}
+
 ResidualCorrelation summary(std::string with, const std::vector<double>& r, std::size_t first,
                             double step_s, double bound) {
   ResidualCorrelation found{.with = std::move(with), .bound = bound};
@@ -185,12 +213,9 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset,
   });
   const std::vector<double>& own = all.front();
   report.correlations.push_back(summary("residual", own, 1, step_s, bound));
-  const auto forgotten = std::ranges::find_if(own, [](double r) { return r < std::exp(-1.0); });
-  if (forgotten != own.end())
-    report.memory_s = static_cast<double>(forgotten - own.begin()) * step_s;
-  const auto end = std::ranges::find_if(own, [](double r) { return r <= 0.0; });
-  report.effective_samples =
-      samples / (1.0 + 2.0 * std::accumulate(own.begin() + 1, std::max(end, own.begin() + 1), 0.0));
+  const Decay decay = decay_of(runs, own, stride, longest);
+  report.memory_s = decay.lags_to_1e * step_s;
+  report.effective_samples = samples / (1.0 + 2.0 * decay.sum);
   for (std::size_t j = 0; j < inputs.size(); ++j)
     report.correlations.push_back(summary(inputs[j], all[1 + j], 0, step_s, bound));
   const double widening = std::sqrt(samples / report.effective_samples);

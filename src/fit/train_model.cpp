@@ -129,31 +129,36 @@ std::size_t recordings_of(const Dataset& dataset) {
   return names.size();
 }
 
-/// What is known of the error in other recordings. Recordings that were held out one after the other are better
-/// evidence than the ends of recordings, which contain another part of the motion; and few strokes have no end that
-/// resembles the rest.
+/// What is known of the error in other recordings. Recordings, or fifths of one, that were held out one after the other
+/// are better evidence than the ends of recordings, which contain another part of the motion; and few strokes have no
+/// end that resembles the rest.
 HeldOutErrors evidence_of(const FittedModel& fitted, const HeldOutErrors& held_out,
                           const TrainingData& training, std::size_t recordings,
                           std::size_t reversals) {
-  const bool has_better = reversals < kFewReversals || fitted.held_out_records >= kSeveralRecords;
-  HeldOutErrors evidence{.rmse = has_better && std::isfinite(fitted.held_out_rmse)
-                                     ? fitted.held_out_rmse
-                                     : std::fmax(fitted.held_out_rmse, held_out.rmse),
-                         .error_bar_factor = held_out.error_bar_factor,
-                         .own_std_dev = held_out.own_std_dev,
-                         .stroke_growth = fitted.stroke_growth,
-                         .factor = other_recordings_factor(recordings, reversals)};
+  const bool has_records = fitted.held_out_records >= kSeveralRecords;
+  const bool has_better = reversals < kFewReversals || has_records || fitted.has_held_out_fifths;
+  const double rmse = has_records ? fitted.held_out_rmse * with_all_records(fitted.held_out_records)
+                                  : fitted.held_out_rmse;
+  HeldOutErrors evidence{
+      .rmse = has_better && std::isfinite(rmse) ? rmse : std::fmax(rmse, held_out.rmse),
+      .error_bar_factor = held_out.error_bar_factor,
+      .own_std_dev = held_out.own_std_dev,
+      .stroke_growth = fitted.stroke_growth,
+      .factor = other_recordings_factor(recordings, reversals)};
   if (reversals == 0) evidence.least_std_dev = target_std_dev(training);
   return evidence;
 }
 
-std::string note_of_reversals(const TrainingData& training, std::size_t reversals) {
+std::string note_of_reversals(const TrainingData& training, std::size_t reversals, double factor) {
   return fmt::format(
       "warning: {} reverses fewer than {} times: how well the model repeats is not known, and the "
       "error bars are {}",
       training.inputs.front().expression, kFewReversals,
-      reversals == 0 ? "the standard deviation of " + training.target
-                     : "twice the error in the training, as in public recordings of few strokes");
+      reversals == 0
+          ? "the standard deviation of " + training.target
+          : fmt::format(
+                "{:g} times the error in the training, as public recordings of few strokes need",
+                factor));
 }
 
 /// Where few recordings are the reason for wider error bars.
@@ -174,7 +179,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   card.mapping = training_mapping(dataset, notes);
   if (dataset.load_target.is_used())
     std::ranges::move(load_target_notes(dataset.load_target), std::back_inserter(notes));
-  if (std::string note = uncertainty_note(dataset); !note.empty()) notes.push_back(std::move(note));
+  std::ranges::move(uncertainty_notes(dataset), std::back_inserter(notes));
   note_left_out(data.training, notes);
   if (data.validation) note_left_out(*data.validation, notes);
   const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
@@ -215,7 +220,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   const std::size_t recordings = recordings_of(dataset);
   const double factor = other_recordings_factor(recordings, reversals);
   if (reversals < kFewReversals) {
-    notes.push_back(note_of_reversals(data.training, reversals));
+    notes.push_back(note_of_reversals(data.training, reversals, factor));
   } else if (factor != 1.0 && !data.validation) {
     notes.push_back(note_of_recordings(recordings, factor));
   }

@@ -337,6 +337,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"MissingRoot",
                  "{root: ['${TORSIO_TEST_UNSET}', nowhere], files: [a.csv]}",
                  {"set.yaml (root)", "nowhere", "export TORSIO_DATA"}},
+        BadInput{"VariableThatNamesNoFolder",
+                 "{root: ['${PATH}', .], files: [a.csv]}",
+                 {"the environment variable PATH: it does not name a folder", "unset PATH"}},
         BadInput{
             "MissingTarget",
             "{target: torqe_Nm, files: [a.csv]}",

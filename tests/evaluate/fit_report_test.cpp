@@ -13,11 +13,11 @@ namespace {
 
 /// A record of a spring of 500 Nm/rad whose torque is off by `error(n)`.
 template <class Error>
-Dataset spring_with(Error error) {
+Dataset spring_with(Error error, std::size_t samples = 4000) {
   Recording recording("spring", 100.0);
   Channel deflection{"spring_deflection_rad", {}};
   Channel torque{"torque_Nm", {}};
-  for (std::size_t n = 0; n < 4000; ++n) {
+  for (std::size_t n = 0; n < samples; ++n) {
     deflection.values.push_back(0.1 * std::sin(0.013 * static_cast<double>(n)));
     torque.values.push_back(500.0 * deflection.values.back() + error(n));
   }
@@ -61,6 +61,16 @@ TEST(FitReportOf, ColouredResidualsHaveFewerEffectiveSamples) {
   EXPECT_NEAR(report.memory_s, 0.2, 0.1);
   EXPECT_NEAR(report.effective_samples, 4000.0 / 39.0, 60.0);
   EXPECT_NEAR(report.table[0].std_error, std::sqrt(4000.0 / report.effective_samples), 1e-9);
+}
+
+TEST(FitReportOf, ResidualsThatAreCorrelatedOverMoreThanTheListedLagsHaveTheirTime) {
+  // First order with 0.999: 1 + 2 sum = 1999, and 1/e after 1000 samples, twice `kMaxLags`.
+  Random random(4);
+  double state = 0.0;
+  const FitReport report = report_of(
+      spring_with([&](std::size_t) { return state = 0.999 * state + random.normal(); }, 200000));
+  EXPECT_NEAR(report.memory_s, 10.0, 2.5);
+  EXPECT_NEAR(report.effective_samples, 100.0, 30.0);
 }
 
 TEST(FitReportOf, PartOfARecordHasNoMoreEffectiveThanScoredSamples) {

@@ -57,6 +57,7 @@ TEST_F(BoardCalls, WithOptionsThatDoNotBelongTogetherAreRefused) {
   refused("board --predictions a.csv --name a,b", "without comma");
   refused("board --predictions a.csv --name mine --page p.md", "--recorded");
   refused("board --quick --page p.md", "a page needs the full run");
+  refused("board --recorded --report p.html", "they show the run of an experiment");
   refused("001-models --page p.md", "--list, or the item board alone");
 }
 

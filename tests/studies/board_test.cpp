@@ -211,6 +211,12 @@ TEST_F(BoardPredictions, MayBeGivenByTime) {
                     HasSubstr("found 0.0205")));
 }
 
+TEST_F(BoardPredictions, MayBeLeftEmptyWhereNothingIsScored) {
+  EXPECT_NEAR(score(file_of(0.0) + "emps,emps_val,3,\n").error, 0.0, 1e-12);
+  EXPECT_THAT(refusal("set,recording,sample,prediction_m\nemps,emps_val,20,\n"),
+              AllOf(HasSubstr("line 2"), HasSubstr("is empty or not finite")));
+}
+
 TEST_F(BoardPredictions, NeedTheirColumnsAndUnit) {
   EXPECT_THAT(refusal(file_of(0.0, "set,recording,prediction_m,x")),
               AllOf(HasSubstr("line 1"), HasSubstr("the column sample is missing"),
@@ -221,6 +227,8 @@ TEST_F(BoardPredictions, NeedTheirColumnsAndUnit) {
               AllOf(HasSubstr("line 1: the predictions have another unit than the set emps"),
                     HasSubstr("expected a column prediction_m"), HasSubstr("found prediction_mm")));
   EXPECT_THAT(refusal("set,recording,sample,prediction_m\n"), HasSubstr("no predictions"));
+  EXPECT_THAT(refusal("set;recording;sample;prediction_m\nemps;emps_val;20;0,5\n"),
+              HasSubstr("line 1: the fields are separated by semicolons"));
 }
 
 TEST_F(BoardPredictions, AreOfOneKnownSetAndRecording) {
@@ -246,7 +254,7 @@ TEST_F(BoardPredictions, AreCompleteOnceAndFinite) {
                                                     "first in line 7")));
   EXPECT_THAT(
       refusal(file_of(0.0, "set,recording,sample,prediction_m", 21) + "emps,emps_val,20,nan\n"),
-      AllOf(HasSubstr("line 11"), HasSubstr("is not finite"), HasSubstr("found nan")));
+      AllOf(HasSubstr("line 11"), HasSubstr("is empty or not finite")));
   EXPECT_THAT(refusal("set,recording,sample,prediction_m\nemps,emps_val,20,1 mm\n"),
               AllOf(HasSubstr("line 2, column prediction_m"), HasSubstr("found \"1 mm\"")));
   EXPECT_THAT(refusal("set,recording,sample,prediction_m\nemps,emps_val,-1,1\n"),

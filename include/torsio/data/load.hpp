@@ -68,7 +68,7 @@ struct Manifest {
 
 /// The folder of the manifest's files: the first of `roots` that exists, after `${VARIABLE}` is
 /// replaced (a root whose variable is not set is skipped), else the manifest's folder.
-/// @throws Error that lists what was tried if none exists.
+/// @throws Error that lists what was tried if none exists, and for a variable that is set to something else than a folder.
 [[nodiscard]] std::string data_folder(const Manifest& manifest);
 
 /// Options of a user, in addition to the files.

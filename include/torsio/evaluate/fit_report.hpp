@@ -35,7 +35,7 @@ struct FitReport {
       correlations;  ///< autocorrelation of the residuals, then with each input
   double memory_s =
       kNotMeasured;  ///< correlation time: lag at which the autocorrelation falls below 1/e
-  /// Effective sample size N / (1 + 2 sum_k r_k) up to the first r_k <= 0.
+  /// Effective sample size N / (1 + 2 sum_k r_k) up to the first r_k <= 0, or a tenth of the longest recording.
   double effective_samples = kNotMeasured;
   /// As fitted; the standard errors are multiplied by sqrt(N / effective_samples), since those of
   /// the fit assume white residuals.

@@ -21,6 +21,8 @@ struct Fitted {
   double held_out_rmse = kNotMeasured;
   /// Recordings that were held out for it one after the other; 0: parts of recordings were.
   std::size_t held_out_records = 0;
+  bool has_held_out_fifths =
+      false;                   ///< contiguous fifths of the only recording, one after the other
   double stroke_growth = 0.0;  ///< `StrokeGuard::growth`; 0: not known
 };
 

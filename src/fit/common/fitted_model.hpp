@@ -20,6 +20,7 @@ FittedModel fitted_model(Fitted<Family> fitted) {
           std::move(fitted.table),
           fitted.held_out_rmse,
           fitted.held_out_records,
+          fitted.has_held_out_fifths,
           fitted.stroke_growth};
 }
 inline FittedModel fitted_model(FittedModel fitted) { return fitted; }

@@ -105,8 +105,13 @@ std::size_t reversals_of(const TrainingData& data) {
 }
 
 double other_recordings_factor(std::size_t recordings, std::size_t reversals) {
-  if (reversals < kFewReversals) return 2.0;
-  return recordings == 1 ? 1.5 : recordings == 2 ? 1.2 : 1.0;
+  if (recordings == 1 || reversals < kFewReversals) return 1.4;
+  return recordings == 2 ? 1.3 : 1.0;
+}
+
+double with_all_records(std::size_t records) {
+  const auto n = static_cast<double>(records);
+  return std::sqrt(1.0 - 1.0 / (n * n));
 }
 
 HeldOutErrors held_out_errors(const TrainingData& data,

@@ -35,6 +35,10 @@ inline constexpr std::size_t kSeveralRecords = 3;
 /// @param recordings files, or recordings made in memory
 [[nodiscard]] double other_recordings_factor(std::size_t recordings, std::size_t reversals);
 
+/// The error of a fit to n recordings over that of fits to n - 1 of them, where the recordings differ by more than their
+/// noise: sqrt((1 + 1/n) / (1 + 1/(n - 1))) = sqrt(1 - 1/n²).
+[[nodiscard]] double with_all_records(std::size_t records);
+
 /// Standard deviation of the target over the usable samples.
 [[nodiscard]] double target_std_dev(const TrainingData& data);
 

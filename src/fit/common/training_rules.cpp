@@ -109,7 +109,10 @@ SensorUncertainty training_uncertainty(const Dataset& dataset) {
   return largest;
 }
 
-std::string uncertainty_note(const Dataset& dataset) {
+namespace {
+
+/// The statement that the error bars contain; empty: none.
+std::string note_of_target(const Dataset& dataset) {
   const SensorUncertainty largest = training_uncertainty(dataset);
   if (!largest.is_stated()) return {};
   std::size_t stating = 0;
@@ -127,6 +130,27 @@ std::string uncertainty_note(const Dataset& dataset) {
   if (differ) note += ", the largest of the recordings";
   if (stating < all) note += fmt::format("; {} of {} recordings state none", all - stating, all);
   return note;
+}
+
+/// The channels whose statements the error bars do not contain, each once.
+std::set<std::string> other_stated_channels(const Dataset& dataset) {
+  std::set<std::string> channels;
+  for (const DatasetRecord& record : dataset.records)
+    for (const auto& [channel, stated] : record.recording.uncertainties)
+      if (record.has_role(Role::train) && channel != dataset.target) channels.insert(channel);
+  return channels;
+}
+
+}  // namespace
+
+std::vector<std::string> uncertainty_notes(const Dataset& dataset) {
+  std::vector<std::string> notes;
+  if (std::string note = note_of_target(dataset); !note.empty()) notes.push_back(std::move(note));
+  if (const std::set<std::string> others = other_stated_channels(dataset); !others.empty())
+    notes.push_back(fmt::format(
+        "the uncertainty of {} has no effect: the error bars contain that of the target, {}, alone",
+        fmt::join(others, ", "), dataset.target));
+  return notes;
 }
 
 void add_training_files(ModelCard& card, const Dataset& dataset) {

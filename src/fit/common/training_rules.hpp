@@ -26,8 +26,8 @@ inline constexpr double kLargestValue = 1e140;
 /// a target that was computed from a known load, which contains its own error.
 [[nodiscard]] SensorUncertainty training_uncertainty(const Dataset& dataset);
 
-/// What a user should know of it, in one sentence; empty: nothing is stated.
-[[nodiscard]] std::string uncertainty_note(const Dataset& dataset);
+/// What a user should know of it, and of statements on other channels, which have no effect.
+[[nodiscard]] std::vector<std::string> uncertainty_notes(const Dataset& dataset);
 
 /// Adds the sources of the records with the role train, each once.
 void add_training_files(ModelCard& card, const Dataset& dataset);

@@ -33,13 +33,15 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
   if (!chosen.note.empty()) fitted.notes.push_back(std::move(chosen.note));
 }
 
-/// A box, the terms that it was fitted for, and the error where a contiguous fifth of a single recording is held out; 0:
-/// none was.
+/// A box, the search that chose its terms of the first input, and the error where a contiguous fifth of a single
+/// recording is held out; 0: none was.
 struct ChosenBox {
-  FittedGreyBox fitted;
-  GreyBoxChoice choice = {};
+  GreyBoxSearch search;
+  GreyBoxSearch::Candidate chosen;  ///< without banks
+  double rate_share = 0.0;
+  FittedGreyBox fitted = {};
+  GreyBoxChoice choice = {};  ///< with banks
   double spans_rmse = 0.0;
-  std::optional<BoxAverage> average = {};  ///< to be taken instead, if there are no banks
 };
 
 /// Takes the terms of a search, with a note.
@@ -117,13 +119,26 @@ void add_banks(ChosenBox& box, const GreyBoxChoice& main, const TrainingData& da
   keep(box, search, chosen, data, search.held_out_error(main));
 }
 
+/// The terms that predict best what is held out. Forces of either sign gain in the first steps of a search and lead away
+/// from passive terms that predict other recordings better; so where recordings are held out, both are searched.
+GreyBoxSearch::Candidate best_terms(const GreyBoxSearch& search, bool passive,
+                                    const Progress& progress) {
+  GreyBoxSearch::Candidate best = search.choose(passive, progress);
+  if (!passive && search.sums().is_by_record) {
+    GreyBoxSearch::Candidate other = search.choose(true, progress);
+    if (other.score < best.score) best = std::move(other);
+  }
+  return search.choose_thresholds(best, progress);
+}
+
 /// The box of the terms that predict best what is held out.
 ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, double rate_share,
                      const Progress& progress) {
-  const GreyBoxSearch search(data, options.schedule, rate_share);
-  const GreyBoxSearch::Candidate chosen =
-      search.choose_thresholds(search.choose(options.passive, progress), progress);
-  ChosenBox box;
+  GreyBoxSearch of_data(data, options.schedule, rate_share);
+  GreyBoxSearch::Candidate best = best_terms(of_data, options.passive, progress);
+  ChosenBox box{.search = std::move(of_data), .chosen = std::move(best), .rate_share = rate_share};
+  const GreyBoxSearch& search = box.search;
+  const GreyBoxSearch::Candidate& chosen = box.chosen;
   FittedGreyBox& fitted = box.fitted;
   fitted.parameters = search.fitted(chosen.choice);
   box.choice = chosen.choice;
@@ -134,27 +149,28 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
                                      search.held_out_error({})));
   if (!options.passive && options.banks && data.input_count() > 1)
     add_banks(box, chosen.choice, data, options, rate_share, progress);
-  if (fitted.parameters.terms.banks.empty())
-    box.average = box_average(search, chosen, data, rate_share);
   // With few strokes every fifth is another part of the motion.
   constexpr std::size_t kLeastStrokes = 20;
   if (search.has_one_record() && fitted.parameters.terms.banks.empty() &&
       strokes_of(data) >= kLeastStrokes) {
     const GreyBoxSums spans = gather_spans(data, fitted.parameters.terms);
     box.spans_rmse = GreyBoxCandidate(spans, chosen.choice).held_out().rmse;
+    fitted.has_held_out_fifths = true;
   }
   fitted.held_out_records = search.held_out_records();
   return box;
 }
 
-void take_average(ChosenBox& box) {
-  if (!box.average) return;
-  box.fitted.parameters = std::move(box.average->parameters);
-  box.fitted.held_out_rmse = box.average->held_out_rmse;
+void take_average(ChosenBox& box, const TrainingData& data) {
+  if (!box.fitted.parameters.terms.banks.empty()) return;
+  std::optional<BoxAverage> average = box_average(box.search, box.chosen, data, box.rate_share);
+  if (!average) return;
+  box.fitted.parameters = std::move(average->parameters);
+  box.fitted.held_out_rmse = average->held_out_rmse;
   box.fitted.notes.push_back(
       fmt::format("the average of this model and {} whose held-out errors are about as low; held "
                   "out: RMSE {:.4g}",
-                  box.average->boxes - 1, box.average->held_out_rmse));
+                  average->boxes - 1, average->held_out_rmse));
 }
 
 /// Error bars as wide as the error on the most different part of the data.
@@ -198,7 +214,7 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
   StrokeErrors strokes;
   if (!fitted.parameters.coefficients.scheduled)
     strokes = stroke_errors(data, fitted.parameters, box.choice, fitted.held_out_rmse);
-  take_average(box);
+  if (options.average) take_average(box, data);
   const double without = fitted.held_out_rmse;
   if (may_learn) learn_residual(fitted, data, options, context);
   // What a network adds is as good there as elsewhere.

@@ -32,8 +32,9 @@ struct GreyBoxOptions {
   std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
   /// Only slip forces, branches and friction of rates >= 0, which take energy and never give it; no residual.
   bool passive = false;
-  bool banks = true;   ///< slip elements, curves and inertias over other inputs may be added
-  double bound = 3.0;  ///< limit of the residual, in RMSE of the box
+  bool banks = true;    ///< slip elements, curves and inertias over other inputs may be added
+  bool average = true;  ///< the boxes whose held-out errors are nearly as low are averaged
+  double bound = 3.0;   ///< limit of the residual, in RMSE of the box
   ResidualKind residual = ResidualKind::automatic;
 
   template <class Self, class Visit>
@@ -46,6 +47,10 @@ struct GreyBoxOptions {
           {.name = "banks",
            .help = "slip elements, curves, products and inertias over other inputs than the first, "
                    "where held-out recordings gain; never if passive"});
+    visit(self.average,
+          {.name = "average",
+           .help = "the average of all models, one step away from the best one, whose held-out "
+                   "errors are within 2 %; false: the best one"});
     visit(
         self.residual,
         {.name = "residual",

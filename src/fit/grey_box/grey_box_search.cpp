@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <cmath>
 #include <cstdint>
-#include <optional>
+#include <limits>
 #include <utility>
 
 #include "core/report_progress.hpp"
@@ -147,6 +147,20 @@ GreyBoxSearch::Candidate GreyBoxSearch::rated(const GreyBoxChoice& choice) const
           .score = has_banks ? error.geometric : error.rmse};
 }
 
+std::vector<GreyBoxSearch::Candidate> GreyBoxSearch::rated(
+    std::vector<GreyBoxChoice> choices) const {
+  std::erase_if(choices,
+                [&](const GreyBoxChoice& c) { return !GreyBoxCandidate(sums_, c).is_possible(); });
+  std::vector<Candidate> candidates(choices.size());
+  for_each_chunk(choices.size(), 0, [&](std::size_t i) {
+    candidates[i] = rated(choices[i]);
+    // A search of active sets that cycles has no result: it is never the lowest.
+    if (std::isnan(candidates[i].score))
+      candidates[i].score = std::numeric_limits<double>::infinity();
+  });
+  return candidates;
+}
+
 template <class Next>
 GreyBoxSearch::Candidate GreyBoxSearch::climbed(Candidate best, double worthwhile, const Next& next,
                                                 const Progress& progress) const {
@@ -154,15 +168,10 @@ GreyBoxSearch::Candidate GreyBoxSearch::climbed(Candidate best, double worthwhil
   for (double step = 0.0;; ++step) {
     report_progress(progress, std::min(step / kUsualSteps, 0.99),
                     fmt::format("choosing terms, error {:.4g}", best.held_out_error));
-    std::optional<Candidate> better;
-    for (const GreyBoxChoice& choice : next(best.choice)) {
-      if (!GreyBoxCandidate(sums_, choice).is_possible()) continue;
-      const Candidate candidate = rated(choice);
-      if (candidate.score < worthwhile * best.score && (!better || candidate.score < better->score))
-        better = candidate;
-    }
-    if (!better) return best;
-    best = *better;
+    std::vector<Candidate> candidates = rated(next(best.choice));
+    const auto better = std::ranges::min_element(candidates, {}, &Candidate::score);
+    if (better == candidates.end() || !(better->score < worthwhile * best.score)) return best;
+    best = std::move(*better);
   }
 }
 
@@ -219,13 +228,7 @@ bool GreyBoxSearch::has_rates() const {
 
 std::vector<GreyBoxSearch::Candidate> GreyBoxSearch::neighbours(const GreyBoxChoice& at) const {
   const bool is_spread = std::ranges::find(kSpreads, at.slips) != kSpreads.end();
-  std::vector<GreyBoxChoice> choices =
-      steps(at, has_rates(), is_spread ? other_spreads : other_thresholds);
-  std::erase_if(choices,
-                [&](const GreyBoxChoice& c) { return !GreyBoxCandidate(sums_, c).is_possible(); });
-  std::vector<Candidate> rated_choices(choices.size());
-  for_each_chunk(choices.size(), 0, [&](std::size_t i) { rated_choices[i] = rated(choices[i]); });
-  return rated_choices;
+  return rated(steps(at, has_rates(), is_spread ? other_spreads : other_thresholds));
 }
 
 const char* GreyBoxSearch::what_was_held_out() const {

@@ -83,6 +83,8 @@ class GreyBoxSearch {
 
  private:
   [[nodiscard]] bool has_rates() const;
+  /// Those for which the samples suffice.
+  [[nodiscard]] std::vector<Candidate> rated(std::vector<GreyBoxChoice> choices) const;
   /// From a line on, with these steps of the thresholds.
   [[nodiscard]] Candidate climbed(const GreyBoxChoice& line, OtherSlips* others,
                                   const Progress& progress) const;

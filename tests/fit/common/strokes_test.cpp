@@ -53,7 +53,9 @@ TEST(Strokes, OfDifferentDurationsAreGroupedFromTheShortestOn) {
 TEST(Strokes, ErrorBarsAreWiderByWhatOtherRecordingsNeed) {
   EXPECT_GT(other_recordings_factor(1, kFewReversals), other_recordings_factor(2, kFewReversals));
   EXPECT_EQ(other_recordings_factor(3, kFewReversals), 1.0);
-  EXPECT_GT(other_recordings_factor(1, 1), other_recordings_factor(1, kFewReversals));
+  EXPECT_GT(other_recordings_factor(3, 1), other_recordings_factor(3, kFewReversals));
+  EXPECT_DOUBLE_EQ(with_all_records(3) * with_all_records(3),
+                   (1.0 + 1.0 / 3.0) / (1.0 + 1.0 / 2.0));
   const TrainingData training = test::noisy_spring();
   const AnyModel model = Linear(fit_linear(training, {}).parameters);
   const FeatureSpec spec{.inputs = {"a", "b"}, .definitions = {}};
