@@ -70,7 +70,8 @@ TEST(FitReportOf, ResidualsThatAreCorrelatedOverMoreThanTheListedLagsHaveTheirTi
   const FitReport report = report_of(
       spring_with([&](std::size_t) { return state = 0.999 * state + random.normal(); }, 200000));
   EXPECT_NEAR(report.memory_s, 10.0, 2.5);
-  EXPECT_NEAR(report.effective_samples, 100.0, 30.0);
+  // Over the listed lags alone it would be 254.
+  EXPECT_NEAR(report.effective_samples, 100.0, 45.0);
 }
 
 TEST(FitReportOf, PartOfARecordHasNoMoreEffectiveThanScoredSamples) {
