@@ -72,12 +72,12 @@ TEST(TrainModel, StatesWhyErrorBarsOfFewRecordingsAreWider) {
     return text;
   };
   const std::string of_two = notes();
-  EXPECT_NE(of_two.find("the error bars are 1.2 times as wide as the training shows: two "
+  EXPECT_NE(of_two.find("the error bars are 1.3 times as wide as the training shows: two "
                         "recordings do not determine"),
             std::string::npos)
       << of_two;
   dataset.records.erase(dataset.records.begin());
-  EXPECT_NE(notes().find("the error bars are 1.5 times as wide"), std::string::npos) << notes();
+  EXPECT_NE(notes().find("the error bars are 1.4 times as wide"), std::string::npos) << notes();
   dataset.records.back().segments.front().role = Role::validation;
   EXPECT_EQ(notes().find("times as wide"), std::string::npos) << notes();
 }

@@ -109,8 +109,9 @@ const std::map<std::string_view, Trial> kTrials{
     {"feedback_noise", {.value = "0.2", .given = {{"training", "noise"}}}},
 };
 
-/// Options without an effect that this little data can show, and why: none today.
-const std::map<std::string_view, std::string_view> kWithoutEffect{};
+/// Options without an effect that this little data can show, and why.
+const std::map<std::string_view, std::string_view> kWithoutEffect{
+    {"grey_box.average", "no other box is nearly as good: BoxAverage.IsLeftOutOnRequest"}};
 
 /// A value within the range that is not the one in force.
 std::string another(const OptionInfo& option, const std::string& value) {

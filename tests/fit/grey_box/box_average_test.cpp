@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "fit/grey_box/fit_grey_box.hpp"
 #include "numerics/thread_share.hpp"
 #include "support/example_data.hpp"
 #include "torsio/core/random.hpp"
@@ -106,6 +107,20 @@ TEST(BoxAverage, IsTheSameForAnyNumberOfThreads) {
   ASSERT_TRUE(first && again);
   EXPECT_EQ(first->parameters.coefficients.values.values,
             again->parameters.coefficients.values.values);
+}
+
+TEST(BoxAverage, IsLeftOutOnRequest) {
+  const TrainingData data = noisy_data();
+  const GreyBoxSearch search(data, "", kReversalShare);
+  const GreyBoxSearch::Candidate chosen = search.choose_thresholds(search.choose(false, {}), {});
+  const auto coefficients = [&](bool averages) {
+    return fit_grey_box(data, {.average = averages, .residual = ResidualKind::none})
+        .parameters.coefficients.values.values;
+  };
+  EXPECT_EQ(coefficients(false), search.fitted(chosen.choice).coefficients.values.values);
+  EXPECT_EQ(
+      coefficients(true),
+      box_average(search, chosen, data, kReversalShare)->parameters.coefficients.values.values);
 }
 
 TEST(BoxAverage, OfPassiveBoxesIsPassive) {
