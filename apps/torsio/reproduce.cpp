@@ -208,9 +208,10 @@ void run(const ReproduceFlags& flags) {
     if (flags.report.is_wanted() || !flags.plot.empty())
       throw torsio::UsageError(
           {.place = "torsio reproduce --report and --plot",
-           .problem = "they show the run of an experiment, and the options of the item board write "
-                      "tables or files instead",
-           .advice = "Leave them away; --page writes docs/board.md."});
+           .problem =
+               "they show the run of an experiment, and these options of the item board write "
+               "tables or files instead",
+           .advice = "Leave them out; --page writes docs/board.md."});
     return reproduce_board(flags.board, flags.items, flags.options, flags.page, flags.json);
   }
   if (!flags.page.empty())

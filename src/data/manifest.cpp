@@ -141,15 +141,15 @@ std::optional<std::string> expanded(std::string text) {
   return text;
 }
 
-/// The variable at the beginning of a root: set to something else than a folder it is a mistake, which the next root
-/// would hide.
-void require_folder_of_variable(const std::string& root) {
-  if (!root.starts_with("${")) return;
-  const std::string variable = root.substr(0, root.find('}') + 1);
-  const auto folder = expanded(variable);
+/// A root `${VARIABLE}` or `${VARIABLE}/...` whose variable is set to something else than a folder is a mistake, which the
+/// next root would hide.
+void require_folder_of_variable(const std::string& root, const std::filesystem::path& beside) {
+  const std::size_t end = root.find('}') + 1;
+  if (!root.starts_with("${") || (end < root.size() && root[end] != '/')) return;
+  const auto folder = expanded(root.substr(0, end));
   std::error_code ignored;
-  if (!folder || std::filesystem::is_directory(*folder, ignored)) return;
-  const std::string name = variable.substr(2, variable.size() - 3);
+  if (!folder || std::filesystem::is_directory(beside / *folder, ignored)) return;
+  const std::string name = root.substr(2, end - 3);
   throw Error({.place = "the environment variable " + name,
                .problem = "it does not name a folder",
                .found = *folder,
@@ -172,9 +172,9 @@ std::string data_folder(const Manifest& manifest) {
   for (const std::string& root : manifest.roots) {
     const auto folder = expanded(root);
     if (!folder) continue;
-    require_folder_of_variable(root);
     std::error_code ignored;
     if (std::filesystem::is_directory(own / *folder, ignored)) return (own / *folder).string();
+    require_folder_of_variable(root, own);
   }
   throw Error({.place = manifest.file + " (root)",
                .problem = "the data are not here",

@@ -97,12 +97,13 @@ class PastValues {
   std::vector<std::vector<double>> columns_;
 };
 
-/// r_k for k = 0, stride, 2 stride, ...
+double residual_of(const Run& run, std::size_t n) { return run.residual[n]; }
+
+/// r_k for k = 0, stride, 2 stride, ... @param every of so many scored samples one is used
 template <class Value>
 std::vector<double> correlations(const std::vector<Run>& runs, const Value& value, std::size_t lags,
-                                 std::size_t stride) {
-  const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
-  const double residual_mean = mean_of(runs, residual);
+                                 std::size_t stride, std::size_t every = 1) {
+  const double residual_mean = mean_of(runs, residual_of);
   const double value_mean = mean_of(runs, value);
   std::vector<double> products(lags, 0.0);
   double residual_square = 0.0;
@@ -111,9 +112,10 @@ std::vector<double> correlations(const std::vector<Run>& runs, const Value& valu
     std::vector<double> x(run.residual.size());
     for (std::size_t n = 0; n < x.size(); ++n) x[n] = value(run, n) - value_mean;
     const PastValues past(x, stride);
+    std::size_t scored = 0;
     for (std::size_t n = 0; n < x.size(); ++n) {
       const double e = run.residual[n] - residual_mean;
-      if (!std::isfinite(e)) continue;
+      if (!std::isfinite(e) || scored++ % every != 0) continue;
       residual_square += e * e;
       const std::span<const double> before = past.from(n);
       value_square += before.front() * before.front();
@@ -132,26 +134,43 @@ struct Decay {
   double sum = 0.0;                  ///< over the lags from 1 on, up to the first r_k <= 0
 };
 
-/// @param own r_k of the first lags. Where they do not reach 0, longer lags, up to a tenth of the longest recording, have a
-/// wider step.
+/// Adds lags, in any steps, to a decay: between two of them r is linear.
+class DecayOfLags {
+ public:
+  /// @returns false from the first r <= 0 on, which is not added
+  bool add(std::size_t lag, double r) {
+    const auto steps = static_cast<double>(lag - last_lag_);
+    if (std::isnan(decay_.lags_to_1e) && r < std::exp(-1.0))
+      decay_.lags_to_1e = static_cast<double>(lag);
+    if (!(r > 0.0)) return false;
+    // The sum of r at `steps` lags on a line from last_ to r, without the first.
+    decay_.sum += 0.5 * steps * (last_ + r) + 0.5 * (r - last_);
+    last_lag_ = lag;
+    last_ = r;
+    return true;
+  }
+  [[nodiscard]] std::size_t last_lag() const { return last_lag_; }
+  [[nodiscard]] const Decay& decay() const { return decay_; }
+
+ private:
+  Decay decay_;
+  std::size_t last_lag_ = 0;
+  double last_ = 1.0;
+};
+
+/// @param own r_k of the first lags. Where they do not reach 0, longer lags follow, up to a tenth of the longest recording,
+/// in wider steps and from as many fewer samples.
 Decay decay_of(const std::vector<Run>& runs, std::vector<double> own, std::size_t stride,
                std::size_t longest) {
-  const auto is_below_0 = [](double r) { return r <= 0.0; };
-  std::size_t step = 1;
-  while (std::ranges::none_of(own, is_below_0) && own.size() * step < longest / 10) {
-    step *= 2;
-    const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
-    own = correlations(runs, residual, std::min(kMaxLags, longest / 10 / step + 1), step * stride);
+  DecayOfLags lags;
+  for (std::size_t step = 1;; step *= 4) {
+    if (step > 1)
+      own = correlations(runs, residual_of, std::min(kMaxLags, longest / 10 / step + 1),
+                         step * stride, step);
+    for (std::size_t k = lags.last_lag() / step + 1; k < own.size(); ++k)
+      if (!lags.add(k * step, own[k])) return lags.decay();
+    if (lags.last_lag() + step >= longest / 10) return lags.decay();
   }
-  const auto forgotten = std::ranges::find_if(own, [](double r) { return r < std::exp(-1.0); });
-  const auto end = std::max(std::ranges::find_if(own, is_below_0), own.begin() + 1);
-  Decay decay;
-  if (forgotten != own.end())
-    decay.lags_to_1e =
-        static_cast<double>((forgotten - own.begin()) * static_cast<std::ptrdiff_t>(step));
-  // The trapezoidal rule, which for a step of 1 is the sum.
-  decay.sum = static_cast<double>(step) * (std::accumulate(own.begin() + 1, end, 0.0) + 0.5) - 0.5;
-  return decay;
 }
 
 ResidualCorrelation summary(std::string with, const std::vector<double>& r, std::size_t first,
@@ -206,9 +225,8 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset,
   const std::vector<std::string>& inputs = model.file.settings.features.inputs;
   std::vector<std::vector<double>> all(1 + inputs.size());
   for_each_chunk(all.size(), 0, [&](std::size_t k) {
-    const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
     const auto input = [k](const Run& run, std::size_t n) { return (*run.features)(n, k - 1); };
-    all[k] = k == 0 ? correlations(runs, residual, lags, stride)
+    all[k] = k == 0 ? correlations(runs, residual_of, lags, stride)
                     : correlations(runs, input, lags, stride);
   });
   const std::vector<double>& own = all.front();

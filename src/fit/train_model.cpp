@@ -137,28 +137,30 @@ HeldOutErrors evidence_of(const FittedModel& fitted, const HeldOutErrors& held_o
                           std::size_t reversals) {
   const bool has_records = fitted.held_out_records >= kSeveralRecords;
   const bool has_better = reversals < kFewReversals || has_records || fitted.has_held_out_fifths;
-  const double rmse = has_records ? fitted.held_out_rmse * with_all_records(fitted.held_out_records)
-                                  : fitted.held_out_rmse;
-  HeldOutErrors evidence{
-      .rmse = has_better && std::isfinite(rmse) ? rmse : std::fmax(rmse, held_out.rmse),
-      .error_bar_factor = held_out.error_bar_factor,
-      .own_std_dev = held_out.own_std_dev,
-      .stroke_growth = fitted.stroke_growth,
-      .factor = other_recordings_factor(recordings, reversals)};
+  HeldOutErrors evidence{.rmse = has_better && std::isfinite(fitted.held_out_rmse)
+                                     ? fitted.held_out_rmse
+                                     : std::fmax(fitted.held_out_rmse, held_out.rmse),
+                         .error_bar_factor = held_out.error_bar_factor,
+                         .own_std_dev = held_out.own_std_dev,
+                         .stroke_growth = fitted.stroke_growth,
+                         .factor = other_recordings_factor(recordings, reversals)};
   if (reversals == 0) evidence.least_std_dev = target_std_dev(training);
   return evidence;
 }
 
+/// @param factor of the error bars where reversals are few; 1: they are those of a validation recording
 std::string note_of_reversals(const TrainingData& training, std::size_t reversals, double factor) {
-  return fmt::format(
-      "warning: {} reverses fewer than {} times: how well the model repeats is not known, and the "
-      "error bars are {}",
-      training.inputs.front().expression, kFewReversals,
-      reversals == 0
-          ? "the standard deviation of " + training.target
-          : fmt::format(
-                "{:g} times the error in the training, as public recordings of few strokes need",
-                factor));
+  std::string note = fmt::format(
+      "warning: {} reverses fewer than {} times: how well the model repeats is not known",
+      training.inputs.front().expression, kFewReversals);
+  if (reversals == 0)
+    note += ", and the error bars are the standard deviation of " + training.target;
+  else if (factor != 1.0)
+    note += fmt::format(
+        ", and the error bars are {:g} times the held-out error, as public recordings of few "
+        "strokes need",
+        factor);
+  return note;
 }
 
 /// Where few recordings are the reason for wider error bars.
@@ -218,10 +220,10 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
     refuse_motion_without_return(data.training);
   note_unexplained(data.training.target, held_out, notes);
   const std::size_t recordings = recordings_of(dataset);
-  const double factor = other_recordings_factor(recordings, reversals);
+  const double factor = data.validation ? 1.0 : other_recordings_factor(recordings, reversals);
   if (reversals < kFewReversals) {
     notes.push_back(note_of_reversals(data.training, reversals, factor));
-  } else if (factor != 1.0 && !data.validation) {
+  } else if (factor != 1.0) {
     notes.push_back(note_of_recordings(recordings, factor));
   }
   TrainedModel trained{.file = {.card = std::move(card),

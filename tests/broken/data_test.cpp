@@ -302,6 +302,7 @@ INSTANTIATE_TEST_SUITE_P(
 class BrokenManifest : public testing::TestWithParam<BadInput> {};
 
 TEST_P(BrokenManifest, IsRefusedWithPlaceAndReason) {
+  setenv("TORSIO_TEST_NO_FOLDER", "/no/such/folder", 1);
   const TemporaryFolder folder;
   static_cast<void>(folder.file("a.csv", "t_s,a_rad,torque_Nm\n0,1,2\n1,2,3\n2,3,4\n"));
   const std::string manifest = folder.file("set.yaml", GetParam().input);
@@ -338,8 +339,9 @@ INSTANTIATE_TEST_SUITE_P(
                  "{root: ['${TORSIO_TEST_UNSET}', nowhere], files: [a.csv]}",
                  {"set.yaml (root)", "nowhere", "export TORSIO_DATA"}},
         BadInput{"VariableThatNamesNoFolder",
-                 "{root: ['${PATH}', .], files: [a.csv]}",
-                 {"the environment variable PATH: it does not name a folder", "unset PATH"}},
+                 "{root: ['${TORSIO_TEST_NO_FOLDER}/set', .], files: [a.csv]}",
+                 {"the environment variable TORSIO_TEST_NO_FOLDER: it does not name a folder",
+                  "found /no/such/folder", "unset TORSIO_TEST_NO_FOLDER"}},
         BadInput{
             "MissingTarget",
             "{target: torqe_Nm, files: [a.csv]}",

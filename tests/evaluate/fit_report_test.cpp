@@ -74,6 +74,21 @@ TEST(FitReportOf, ResidualsThatAreCorrelatedOverMoreThanTheListedLagsHaveTheirTi
   EXPECT_NEAR(report.effective_samples, 100.0, 45.0);
 }
 
+TEST(FitReportOf, WhiteNoiseBesideASlowErrorIsForgottenAfterASample) {
+  // A tenth of the variance is of first order with 0.999: 1 + 2 sum = 201.
+  Random random(4);
+  double state = 0.0;
+  const double drive = std::sqrt((1.0 - 0.999 * 0.999) / 9.0);
+  const FitReport report = report_of(spring_with(
+      [&](std::size_t) {
+        state = 0.999 * state + drive * random.normal();
+        return state + random.normal();
+      },
+      200000));
+  EXPECT_NEAR(report.memory_s, 0.01, 1e-12);
+  EXPECT_LT(report.effective_samples, 2000.0) << "1000, and 2500 of the listed lags alone";
+}
+
 TEST(FitReportOf, PartOfARecordHasNoMoreEffectiveThanScoredSamples) {
   Random random(4);
   double state = 0.0;

@@ -49,8 +49,8 @@ TEST(TrainModel, TakesTheLargestUncertaintyOfTheTargetThatATrainingRecordStates)
             "the error bars contain the error of the reference sensor as it was stated, 0.2 Nm + 1 "
             "% of the value (standard uncertainty); 1 of 2 recordings state none");
   EXPECT_EQ(trained.notes.at(1),
-            "the uncertainty of gear_angle_rad has no effect: the error bars contain that of the "
-            "target, torque_Nm, alone");
+            "the uncertainty of gear_angle_rad has no effect on the error bars: only that of the "
+            "target, torque_Nm has one");
   dataset.records[1].recording.uncertainties = {{"torque_Nm", {.constant = 0.3}}};
   trained = train_model(dataset, choice, 1);
   EXPECT_EQ(trained.file.settings.target_uncertainty,

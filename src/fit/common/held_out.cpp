@@ -109,9 +109,10 @@ double other_recordings_factor(std::size_t recordings, std::size_t reversals) {
   return recordings == 2 ? 1.3 : 1.0;
 }
 
-double with_all_records(std::size_t records) {
+double error_share_with_all(std::size_t records, std::size_t folds) {
   const auto n = static_cast<double>(records);
-  return std::sqrt(1.0 - 1.0 / (n * n));
+  const double fitted_to = n * (1.0 - 1.0 / static_cast<double>(folds));
+  return std::sqrt((1.0 + 1.0 / n) / (1.0 + 1.0 / fitted_to));
 }
 
 HeldOutErrors held_out_errors(const TrainingData& data,

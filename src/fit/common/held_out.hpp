@@ -35,9 +35,10 @@ inline constexpr std::size_t kSeveralRecords = 3;
 /// @param recordings files, or recordings made in memory
 [[nodiscard]] double other_recordings_factor(std::size_t recordings, std::size_t reversals);
 
-/// The error of a fit to n recordings over that of fits to n - 1 of them, where the recordings differ by more than their
-/// noise: sqrt((1 + 1/n) / (1 + 1/(n - 1))) = sqrt(1 - 1/n²).
-[[nodiscard]] double with_all_records(std::size_t records);
+/// The error of a fit to n recordings over that of fits without one of `folds` groups of them, where the recordings differ by
+/// more than their noise: sqrt((1 + 1/n) / (1 + 1/m)), m = n (1 - 1/folds); sqrt(1 - 1/n²) where each group is one recording.
+/// @param records, folds at least 2
+[[nodiscard]] double error_share_with_all(std::size_t records, std::size_t folds);
 
 /// Standard deviation of the target over the usable samples.
 [[nodiscard]] double target_std_dev(const TrainingData& data);

@@ -132,12 +132,15 @@ std::string note_of_target(const Dataset& dataset) {
   return note;
 }
 
-/// The channels whose statements the error bars do not contain, each once.
+/// The channels whose statements the error bars do not contain, each once: all but the target, and the target as well
+/// where it is computed from a known load.
 std::set<std::string> other_stated_channels(const Dataset& dataset) {
   std::set<std::string> channels;
   for (const DatasetRecord& record : dataset.records)
     for (const auto& [channel, stated] : record.recording.uncertainties)
-      if (record.has_role(Role::train) && channel != dataset.target) channels.insert(channel);
+      if (record.has_role(Role::train) &&
+          (channel != dataset.target || dataset.load_target.is_used()))
+        channels.insert(channel);
   return channels;
 }
 
@@ -148,8 +151,9 @@ std::vector<std::string> uncertainty_notes(const Dataset& dataset) {
   if (std::string note = note_of_target(dataset); !note.empty()) notes.push_back(std::move(note));
   if (const std::set<std::string> others = other_stated_channels(dataset); !others.empty())
     notes.push_back(fmt::format(
-        "the uncertainty of {} has no effect: the error bars contain that of the target, {}, alone",
-        fmt::join(others, ", "), dataset.target));
+        "the uncertainty of {} has no effect on the error bars: only that of {} has one",
+        fmt::join(others, ", "),
+        dataset.load_target.is_used() ? "the known load" : "the target, " + dataset.target));
   return notes;
 }
 

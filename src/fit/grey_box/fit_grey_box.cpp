@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -155,7 +156,7 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
       strokes_of(data) >= kLeastStrokes) {
     const GreyBoxSums spans = gather_spans(data, fitted.parameters.terms);
     box.spans_rmse = GreyBoxCandidate(spans, chosen.choice).held_out().rmse;
-    fitted.has_held_out_fifths = true;
+    fitted.has_held_out_fifths = std::isfinite(box.spans_rmse);
   }
   fitted.held_out_records = search.held_out_records();
   return box;
@@ -182,8 +183,11 @@ void widen(ChosenBox& box, const StrokeErrors& strokes) {
     widest = of;
   };
   to(box.spans_rmse, "contiguous fifths");
-  // Whole recordings that were held out already contain strokes of all durations.
-  if (box.fitted.held_out_records < kSeveralRecords) to(strokes.rmse, "strokes of other durations");
+  const GreyBoxSums& sums = box.search.sums();
+  if (box.fitted.held_out_records < kSeveralRecords)
+    to(strokes.rmse, "strokes of other durations");
+  else if (sums.is_by_record)  // which already contain strokes of all durations
+    box.fitted.held_out_rmse *= error_share_with_all(sums.records, sums.folds);
   if (widest != nullptr)
     box.fitted.notes.push_back(fmt::format(
         "without a validation recording, error bars are those of held-out {}: RMSE {:.4g}", widest,

@@ -49,8 +49,8 @@ struct GreyBoxOptions {
                    "where held-out recordings gain; never if passive"});
     visit(self.average,
           {.name = "average",
-           .help = "the average of all models, one step away from the best one, whose held-out "
-                   "errors are within 2 %; false: the best one"});
+           .help = "average the best model with those one step away whose held-out errors are at "
+                   "most 2 % higher; not with banks or a schedule"});
     visit(
         self.residual,
         {.name = "residual",
@@ -74,7 +74,8 @@ using FittedGreyBox = Fitted<GreyBox>;
 ///
 /// Starting from the linear model, the step (more knots of the curve, more slip elements, more
 /// knots of their forces, signed forces, relaxation, viscous and dry friction of rates, less
-/// smoothing) that lowers the held-out error most is taken as long as it lowers it by 1 %. Held out
+/// smoothing) that lowers the held-out error most is taken as long as it lowers it by 1 %. Where records are held out, passive
+/// terms are searched on their own as well, and the better terms of both are taken. Held out
 /// are: the records one at a time, if there are two; of a schedule the inner knots, one at a
 /// time, interpolated over the others; else fifths of interleaved blocks. Every candidate is
 /// evaluated on sums that are computed once (AᵀA of all terms, for each fold), so the search does

@@ -54,7 +54,7 @@ TEST(Strokes, ErrorBarsAreWiderByWhatOtherRecordingsNeed) {
   EXPECT_GT(other_recordings_factor(1, kFewReversals), other_recordings_factor(2, kFewReversals));
   EXPECT_EQ(other_recordings_factor(3, kFewReversals), 1.0);
   EXPECT_GT(other_recordings_factor(3, 1), other_recordings_factor(3, kFewReversals));
-  EXPECT_DOUBLE_EQ(with_all_records(3) * with_all_records(3),
+  EXPECT_DOUBLE_EQ(error_share_with_all(3, 3) * error_share_with_all(3, 3),
                    (1.0 + 1.0 / 3.0) / (1.0 + 1.0 / 2.0));
   const TrainingData training = test::noisy_spring();
   const AnyModel model = Linear(fit_linear(training, {}).parameters);
