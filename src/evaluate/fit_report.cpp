@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <utility>
@@ -128,48 +127,38 @@ std::vector<double> correlations(const std::vector<Run>& runs, const Value& valu
   return products;
 }
 
-/// How the autocorrelation decays.
+/// How the autocorrelation decays, from lags that are added in any steps: between two of them r is linear.
 struct Decay {
   double lags_to_1e = kNotMeasured;  ///< the first lag below 1/e; NaN if there is none
   double sum = 0.0;                  ///< over the lags from 1 on, up to the first r_k <= 0
-};
+  std::size_t last_lag = 0;
+  double last = 1.0;
 
-/// Adds lags, in any steps, to a decay: between two of them r is linear.
-class DecayOfLags {
- public:
   /// @returns false from the first r <= 0 on, which is not added
   bool add(std::size_t lag, double r) {
-    const auto steps = static_cast<double>(lag - last_lag_);
-    if (std::isnan(decay_.lags_to_1e) && r < std::exp(-1.0))
-      decay_.lags_to_1e = static_cast<double>(lag);
+    const auto steps = static_cast<double>(lag - last_lag);
+    if (std::isnan(lags_to_1e) && r < std::exp(-1.0)) lags_to_1e = static_cast<double>(lag);
     if (!(r > 0.0)) return false;
-    // The sum of r at `steps` lags on a line from last_ to r, without the first.
-    decay_.sum += 0.5 * steps * (last_ + r) + 0.5 * (r - last_);
-    last_lag_ = lag;
-    last_ = r;
+    // The sum of r at `steps` lags on a line from `last` to r, without the first.
+    sum += 0.5 * steps * (last + r) + 0.5 * (r - last);
+    last_lag = lag;
+    last = r;
     return true;
   }
-  [[nodiscard]] std::size_t last_lag() const { return last_lag_; }
-  [[nodiscard]] const Decay& decay() const { return decay_; }
-
- private:
-  Decay decay_;
-  std::size_t last_lag_ = 0;
-  double last_ = 1.0;
 };
 
 /// @param own r_k of the first lags. Where they do not reach 0, longer lags follow, up to a tenth of the longest recording,
 /// in wider steps and from as many fewer samples.
 Decay decay_of(const std::vector<Run>& runs, std::vector<double> own, std::size_t stride,
                std::size_t longest) {
-  DecayOfLags lags;
+  Decay decay;
   for (std::size_t step = 1;; step *= 4) {
     if (step > 1)
       own = correlations(runs, residual_of, std::min(kMaxLags, longest / 10 / step + 1),
                          step * stride, step);
-    for (std::size_t k = lags.last_lag() / step + 1; k < own.size(); ++k)
-      if (!lags.add(k * step, own[k])) return lags.decay();
-    if (lags.last_lag() + step >= longest / 10) return lags.decay();
+    for (std::size_t k = decay.last_lag / step + 1; k < own.size(); ++k)
+      if (!decay.add(k * step, own[k])) return decay;
+    if (decay.last_lag + step >= longest / 10) return decay;
   }
 }
 

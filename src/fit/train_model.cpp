@@ -210,17 +210,19 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
             });
   const bool is_spring = fitted.model.traits().is_spring;
   const std::size_t reversals = is_spring ? reversals_of(data.training) : kFewReversals;
-  EstimatorSettings settings = guarded_settings(
-      choice.features, data.training, fitted.model, data.validation ? &*data.validation : nullptr,
-      evidence_of(fitted, held_out, data.training, recordings_of(dataset), reversals));
+  const std::size_t recordings = recordings_of(dataset);
+  const HeldOutErrors evidence =
+      evidence_of(fitted, held_out, data.training, recordings, reversals);
+  EstimatorSettings settings =
+      guarded_settings(choice.features, data.training, fitted.model,
+                       data.validation ? &*data.validation : nullptr, evidence);
   settings.target_uncertainty = training_uncertainty(dataset);
   const bool has_memory =
       !fitted.model.memory({settings.ranges.lowest, settings.ranges.highest}).is_empty();
   if (family.is_spring && has_memory && !held_out.has_return)
     refuse_motion_without_return(data.training);
   note_unexplained(data.training.target, held_out, notes);
-  const std::size_t recordings = recordings_of(dataset);
-  const double factor = data.validation ? 1.0 : other_recordings_factor(recordings, reversals);
+  const double factor = data.validation ? 1.0 : evidence.factor;
   if (reversals < kFewReversals) {
     notes.push_back(note_of_reversals(data.training, reversals, factor));
   } else if (factor != 1.0) {
