@@ -88,7 +88,9 @@ BoardRow row_of(const BoardSet& set, std::string_view model, const BoardErrors& 
     row.remark =
         fmt::format("diverged at {} samples: those of its guard are scored", errors.diverged);
   if (is_incomplete)
-    row.remark = fmt::format("no estimate at {} of {} scored samples", errors.without, scored);
+    row.remark = fmt::format(
+        "no estimate at {} of {} scored samples: it warms up for as long as its start matters",
+        errors.without, scored);
   else if (errors.without > 0 && row.remark.empty())
     row.remark = fmt::format("{} samples are not scored: filters had not settled", errors.without);
   return row;

@@ -47,7 +47,8 @@ writes the rows of a run, from which the program is built again; sets that were 
 
    The name of the last column ends in the unit of the set: `prediction_m`, `prediction_Nm` or `prediction_rad`. `t_s`
    may take the place of `sample`. The order of lines and columns is free, further columns and lines that begin with `#`
-   are ignored, and so are predictions of samples that are not scored. A file is for one set and may be gzipped.
+   are ignored, and so are predictions of samples that are not scored, which may also be left empty. A file is for one
+   set and may be gzipped.
 3. Score it:
 
        torsio reproduce board --predictions mine.csv --name "my model"

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/root_of_squares.hpp"
 #include "estimate/estimator_checks.hpp"
 #include "estimate/guard_listing.hpp"
 #include "torsio/core/state_bytes.hpp"
@@ -241,11 +242,11 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
       out.value = raw_estimate.value;
       out.std_dev = std_dev;
     }
-    if (!memory_error_.is_zero()) out.std_dev = std::hypot(out.std_dev, memory_error_.bound());
-    if (start_std_dev_ > 0.0) out.std_dev = std::hypot(out.std_dev, start_std_dev_);
-    if (level_error_ > 0.0) out.std_dev = std::hypot(out.std_dev, level_error_);
+    if (!memory_error_.is_zero()) out.std_dev = root_of_squares(out.std_dev, memory_error_.bound());
+    if (start_std_dev_ > 0.0) out.std_dev = root_of_squares(out.std_dev, start_std_dev_);
+    if (level_error_ > 0.0) out.std_dev = root_of_squares(out.std_dev, level_error_);
     if (novelty > 0.0)
-      out.std_dev = std::hypot(
+      out.std_dev = root_of_squares(
           out.std_dev, std::min(settings_.strokes.growth * novelty, settings_.strokes.limit));
     if (excursion.share > 0.0)
       out.std_dev = widened(out.std_dev, excursion, out.value - fallback_value(features));
@@ -257,7 +258,7 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
       out.std_dev = evidence(settings_.fallback.residual_std);
   }
   if (settings_.target_uncertainty.is_stated())
-    out.std_dev = std::hypot(out.std_dev, settings_.target_uncertainty.at(out.value));
+    out.std_dev = root_of_squares(out.std_dev, settings_.target_uncertainty.at(out.value));
   out.novelty = has_strokes() && std::isnan(raw_estimate.novelty) ? novelty : raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
     // With an unknown zero, the range of a channel cannot be checked. A warm-up ends by itself, the want of a
@@ -291,8 +292,8 @@ EstimatorCore::Excursion EstimatorCore::excursion(Features features) const noexc
 // Two extrapolations: the further beyond the range, the less evidence there is for either.
 double EstimatorCore::widened(double std_dev, const Excursion& excursion,
                               double departure) noexcept {
-  return std::hypot(std_dev * (1.0 + kExcursionGain * excursion.share),
-                    std::min(excursion.first, 1.0) * departure);
+  return root_of_squares(std_dev * (1.0 + kExcursionGain * excursion.share),
+                         std::min(excursion.first, 1.0) * departure);
 }
 
 double EstimatorCore::model_std_dev(const Estimate& raw_estimate) const noexcept {

@@ -1,6 +1,5 @@
 #include "numerics/nnls.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -21,7 +20,8 @@ class ActiveSet {
   ActiveSet(const NormalEquations& equations, std::span<const std::uint8_t> is_free)
       : is_free_(is_free),
         lengths_(equations.columns()),
-        solution_(Eigen::VectorXd::Zero(static_cast<Index>(equations.columns()))) {
+        solution_(Eigen::VectorXd::Zero(static_cast<Index>(equations.columns()))),
+        factor_(static_cast<Index>(equations.columns()), static_cast<Index>(equations.columns())) {
     const auto count = static_cast<Index>(equations.columns());
     product_ = Eigen::Map<const RowMajor>(equations.product.values.data(), count, count);
     projection_ = Eigen::Map<const Eigen::VectorXd>(equations.projection.data(), count);
@@ -76,21 +76,45 @@ class ActiveSet {
  private:
   [[nodiscard]] bool is_free(Index j) const { return is_free_[static_cast<std::size_t>(j)] != 0; }
 
-  [[nodiscard]] Eigen::LLT<Eigen::MatrixXd> factors() const {
-    return Eigen::LLT<Eigen::MatrixXd>(product_(passive_, passive_));
+  /// The lower Cholesky factor of the passive columns' product, of which only the rows of columns that have
+  /// entered since the last call are computed.
+  [[nodiscard]] auto factor() {
+    const auto count = static_cast<Index>(passive_.size());
+    for (; factored_ < count; ++factored_) {
+      const Index j = passive_[static_cast<std::size_t>(factored_)];
+      const Eigen::VectorXd row = along_factored(j);
+      factor_.row(factored_).head(factored_) = row;
+      factor_(factored_, factored_) = std::sqrt(product_(j, j) - row.squaredNorm());
+    }
+    return factor_.topLeftCorner(count, count).triangularView<Eigen::Lower>();
+  }
+
+  /// Column j in the orthonormal basis of the passive columns that are factored.
+  [[nodiscard]] Eigen::VectorXd along_factored(Index j) const {
+    Eigen::VectorXd along(factored_);
+    for (Index i = 0; i < factored_; ++i)
+      along[i] = product_(passive_[static_cast<std::size_t>(i)], j);
+    if (factored_ > 0)
+      factor_.topLeftCorner(factored_, factored_)
+          .triangularView<Eigen::Lower>()
+          .solveInPlace(along);
+    return along;
   }
 
   /// What of column j the passive ones leave unexplained, squared, above the limit?
-  [[nodiscard]] bool is_independent(Index j) const {
+  [[nodiscard]] bool is_independent(Index j) {
     if (!(product_(j, j) > 0.0)) return false;
-    if (passive_.empty()) return true;
-    const Eigen::VectorXd along = product_(passive_, j);
-    return product_(j, j) - along.dot(factors().solve(along)) > kDependentColumn;
+    static_cast<void>(factor());
+    return product_(j, j) - along_factored(j).squaredNorm() > kDependentColumn;
   }
 
-  [[nodiscard]] Eigen::VectorXd passive_solution() const {
+  [[nodiscard]] Eigen::VectorXd passive_solution() {
     if (passive_.empty()) return {};
-    return factors().solve(Eigen::VectorXd(projection_(passive_)));
+    const auto lower = factor();
+    Eigen::VectorXd solution = projection_(passive_);
+    lower.solveInPlace(solution);
+    lower.transpose().solveInPlace(solution);
+    return solution;
   }
 
   void move_to(const Eigen::VectorXd& values) {
@@ -101,16 +125,20 @@ class ActiveSet {
 
   /// The column outside along which the error falls most, or -1. What the passive columns explain
   /// cannot enter.
-  [[nodiscard]] Index steepest(const std::vector<Index>& refused) const {
-    const Eigen::VectorXd fall = projection_ - product_ * solution_;
-    Index best = -1;
-    for (Index j = 0; j < fall.size(); ++j) {
-      const bool is_out = !is_free(j) && std::ranges::find(passive_, j) == passive_.end() &&
-                          std::ranges::find(refused, j) == refused.end();
-      if (is_out && fall[j] > tolerance_ && (best < 0 || fall[j] > fall[best]) && is_independent(j))
-        best = j;
+  [[nodiscard]] Index steepest(const std::vector<Index>& refused) {
+    Eigen::VectorXd fall = projection_ - product_ * solution_;
+    const auto leave_out = [&](Index j) { fall[j] = 0.0; };
+    for (Index j = 0; j < fall.size(); ++j)
+      if (is_free(j)) leave_out(j);
+    std::ranges::for_each(passive_, leave_out);
+    std::ranges::for_each(refused, leave_out);
+    while (fall.size() > 0) {
+      Index best = 0;
+      if (!(fall.maxCoeff(&best) > tolerance_)) return -1;
+      if (is_independent(best)) return best;
+      leave_out(best);
     }
-    return best;
+    return -1;
   }
 
   /// Towards the passive columns' own solution, columns that meet 0 on the way leaving.
@@ -139,7 +167,10 @@ class ActiveSet {
         value += share * (wanted[static_cast<Index>(i)] - value);
       }
       solution_[leaving] = 0.0;
-      std::erase_if(passive_, [&](Index j) { return !is_free(j) && solution_[j] <= 0.0; });
+      const auto leaves = [&](Index j) { return !is_free(j) && solution_[j] <= 0.0; };
+      const auto first = std::ranges::find_if(passive_, leaves) - passive_.begin();
+      factored_ = std::min(factored_, static_cast<Index>(first));
+      std::erase_if(passive_, leaves);
     }
   }
 
@@ -149,6 +180,8 @@ class ActiveSet {
   Eigen::VectorXd projection_;
   Eigen::VectorXd solution_;
   std::vector<Index> passive_;
+  Eigen::MatrixXd factor_;  ///< see `factor`
+  Index factored_ = 0;      ///< its rows that hold for `passive_`
   double tolerance_ = 0.0;
 };
 

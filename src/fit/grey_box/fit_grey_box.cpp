@@ -121,11 +121,12 @@ void add_banks(ChosenBox& box, const GreyBoxChoice& main, const TrainingData& da
 }
 
 /// The terms that predict best what is held out. Forces of either sign gain in the first steps of a search and lead away
-/// from passive terms that predict other recordings better; so where recordings are held out, both are searched.
+/// from passive terms that predict other recordings better; so where recordings are held out, both are searched. Without
+/// rates, a search that ends with forces >= 0 has taken the steps of a passive one.
 GreyBoxSearch::Candidate best_terms(const GreyBoxSearch& search, bool passive,
                                     const Progress& progress) {
   GreyBoxSearch::Candidate best = search.choose(passive, progress);
-  if (!passive && search.sums().is_by_record) {
+  if (!passive && search.sums().is_by_record && (best.choice.is_signed || search.has_rates())) {
     GreyBoxSearch::Candidate other = search.choose(true, progress);
     if (other.score < best.score) best = std::move(other);
   }

@@ -194,22 +194,31 @@ bool GreyBoxCandidate::is_possible() const noexcept {
 
 std::vector<NormalEquations> GreyBoxCandidate::projected(
     const std::vector<NormalEquations>& all) const {
-  const std::vector<ColumnShare> shares = this->map();
-  Eigen::SparseMatrix<double> map(static_cast<Index>(sums_.all.columns()),
+  std::vector<ColumnShare> shares = this->map();
+  // A candidate uses few of the finest terms, so those are taken out first.
+  std::vector<Index> used;
+  for (const ColumnShare& share : shares) used.push_back(static_cast<Index>(share.from));
+  std::ranges::sort(used);
+  used.erase(std::ranges::unique(used).begin(), used.end());
+  for (ColumnShare& share : shares)
+    share.from = static_cast<std::size_t>(
+        std::ranges::lower_bound(used, static_cast<Index>(share.from)) - used.begin());
+  Eigen::SparseMatrix<double> map(static_cast<Index>(used.size()),
                                   static_cast<Index>(structure_.columns()));
   map.setFromTriplets(shares.begin(), shares.end());
+  const auto finest = static_cast<Index>(sums_.all.columns());
   std::vector<NormalEquations> cells;
   cells.reserve(all.size());
   for (const NormalEquations& cell : all) {
     NormalEquations& small = cells.emplace_back(structure_.columns());
-    const Eigen::Map<const RowMajor> product(cell.product.values.data(),
-                                             static_cast<Index>(sums_.all.columns()),
-                                             static_cast<Index>(sums_.all.columns()));
-    const Eigen::MatrixXd half = product * map;
+    const Eigen::Map<const RowMajor> product(cell.product.values.data(), finest, finest);
+    const Eigen::Map<const Eigen::VectorXd> projection(cell.projection.data(), finest);
+    const RowMajor taken = product(used, used);
+    const Eigen::MatrixXd half = taken * map;
     Eigen::Map<RowMajor>(small.product.values.data(), map.cols(), map.cols()) =
         map.transpose() * half;
     Eigen::Map<Eigen::VectorXd>(small.projection.data(), map.cols()) =
-        map.transpose() * Eigen::Map<const Eigen::VectorXd>(cell.projection.data(), map.rows());
+        map.transpose() * Eigen::VectorXd(projection(used));
     small.square = cell.square;
     small.rows = cell.rows;
   }

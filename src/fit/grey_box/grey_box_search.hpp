@@ -80,9 +80,9 @@ class GreyBoxSearch {
   [[nodiscard]] std::vector<Candidate> neighbours(const GreyBoxChoice& at) const;
 
   [[nodiscard]] const GreyBoxSums& sums() const noexcept { return sums_; }
+  [[nodiscard]] bool has_rates() const;
 
  private:
-  [[nodiscard]] bool has_rates() const;
   /// Those for which the samples suffice.
   [[nodiscard]] std::vector<Candidate> rated(std::vector<GreyBoxChoice> choices) const;
   /// From a line on, with these steps of the thresholds.

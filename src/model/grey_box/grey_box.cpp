@@ -46,6 +46,18 @@ GreyBoxTerms::Structure checked(GreyBoxTerms::Structure structure) {
   return structure;
 }
 
+/// The sum of terms times their coefficients. Each addition waits for the one before it, so two hats are one.
+template <class Coefficient>
+struct TermSum {
+  const Coefficient& coefficient;
+  double value = 0.0;
+
+  void operator()(std::size_t column, double term) { value += coefficient(column) * term; }
+  void hats(std::size_t column, double share, double factor) {
+    value += (coefficient(column) * (1.0 - share) + coefficient(column + 1) * share) * factor;
+  }
+};
+
 }  // namespace
 
 GreyBoxTerms::GreyBoxTerms(Structure structure)
@@ -73,6 +85,9 @@ void GreyBoxTerms::move(Features features) noexcept {
   const double dx = is_started_ ? x - last_ : 0.0;
   last_ = x;
   is_started_ = true;
+  curve_cell_ = detail::cell_of(structure_.curve_knots, x, curve_cell_);
+  if (structure_.friction_knots.size() > 1)
+    friction_cell_ = detail::cell_of(structure_.friction_knots, x, friction_cell_);
   slips_.move(dx);
   std::ranges::copy(slips_.forces(), state_.begin());
   const std::size_t slips = slips_.size();
@@ -179,17 +194,19 @@ ModelMemory GreyBox::memory(const InputRanges& ranges) const {
 
 Estimate GreyBox::step(Features features) noexcept {
   terms_.move(features);
+  const auto sum = [&](const auto& coefficient) {
+    TermSum terms{coefficient};
+    terms_.visit(features, terms);
+    return terms.value;
+  };
   double value = 0.0;
-  if (!coefficients_.schedule()
-           .scheduled) {  // most are not, and interpolation takes a third of the step
-    const auto coefficients = coefficients_.schedule().values.row(0);
-    terms_.visit(features,
-                 [&](std::size_t column, double term) { value += coefficients[column] * term; });
+  if (!coefficients_.schedule().scheduled) {
+    // Most are not, and interpolation takes a third of the step.
+    const auto row = coefficients_.schedule().values.row(0);
+    value = sum([row](std::size_t column) { return row[column]; });
   } else {
     const auto at = coefficients_.locate(features);
-    terms_.visit(features, [&](std::size_t column, double term) {
-      value += coefficients_.coefficient(at, column) * term;
-    });
+    value = sum([&](std::size_t column) { return coefficients_.coefficient(at, column); });
   }
   return {.value = value + residual(features)};
 }

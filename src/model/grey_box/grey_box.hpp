@@ -169,7 +169,7 @@ class GreyBoxTerms {
   /// @param state of s_i / r_i, then of v_j, as a function of the index
   template <class Number, class State, class Term>
   void visit_motion(Number x, const State& state, Term&& term) const noexcept {
-    const auto curve = detail::hat_cell(structure_.curve_knots, x);
+    const auto curve = detail::hat_cell(structure_.curve_knots, x, curve_cell_);
     term(curve.left, 1.0 - curve.share);
     term(curve.left + 1, curve.share);
     const std::size_t slips = slips_.size();
@@ -178,12 +178,10 @@ class GreyBoxTerms {
     if (knots == 1) {
       for (std::size_t i = 0; i < slips; ++i) term(column + i, state(i));
     } else {
-      const auto slip = detail::held_hat_cell(structure_.friction_knots, x);
+      const auto slip = detail::held_hat_cell(structure_.friction_knots, x, friction_cell_);
       column += slip.left;
-      for (std::size_t i = 0; i < slips; ++i, column += knots) {
-        term(column, (1.0 - slip.share) * state(i));
-        term(column + 1, slip.share * state(i));
-      }
+      for (std::size_t i = 0; i < slips; ++i, column += knots)
+        detail::visit_hats(term, column, slip.share, state(i));
     }
     for (std::size_t j = 0; j < decay_.size(); ++j)
       term(structure_.first_relaxation() + j, state(slips + j));
@@ -197,6 +195,9 @@ class GreyBoxTerms {
   std::vector<double> state_;
   double last_ = 0.0;
   bool is_started_ = false;
+  // Between which knots x was at the last `move`; see `cell_of`.
+  std::size_t curve_cell_ = 0;
+  std::size_t friction_cell_ = 0;
 };
 
 /// torsio's own spring model: what physics allows, and of that what the data ask for.

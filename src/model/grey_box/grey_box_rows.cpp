@@ -148,15 +148,12 @@ void GreyBoxRows::add_slips(const Motion& motion, std::span<const double> knots,
     if (knots.size() == 1) {
       for (std::size_t n = 0; n < kGroup; ++n) value[n] += column[0] * slip[n];
     } else if (knots.size() == 2) {
-      for (std::size_t n = 0; n < kGroup; ++n) {
-        value[n] += column[0] * ((1.0 - cells_.share[n]) * slip[n]);
-        value[n] += column[1] * (cells_.share[n] * slip[n]);
-      }
+      for (std::size_t n = 0; n < kGroup; ++n)
+        value[n] += (column[0] * (1.0 - cells_.share[n]) + column[1] * cells_.share[n]) * slip[n];
     } else {
       for (std::size_t n = 0; n < kGroup; ++n) {
         const double* const at = column + cells_.left[n];
-        value[n] += at[0] * ((1.0 - cells_.share[n]) * slip[n]);
-        value[n] += at[1] * (cells_.share[n] * slip[n]);
+        value[n] += (at[0] * (1.0 - cells_.share[n]) + at[1] * cells_.share[n]) * slip[n];
       }
     }
   }

@@ -17,21 +17,48 @@ struct HatCell {
   Number share{};  ///< below 0 and above 1 beyond the ends
 };
 
+/// @returns the place of the cell's left knot; the first and the last cell have no end outside
 /// @param knots ascending, at least 2
+/// @param near the cell to look at first: that of the last step saves nearly every search
+[[nodiscard]] inline std::size_t cell_of(std::span<const double> knots, double x,
+                                         std::size_t near) noexcept {
+  const bool is_near =
+      (near == 0 || knots[near] <= x) && (near + 2 == knots.size() || x < knots[near + 1]);
+  if (is_near) return near;
+  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, x);
+  return static_cast<std::size_t>(above - knots.begin()) - 1;
+}
+
+/// @param knots, near as `cell_of`
 template <class Number>
-[[nodiscard]] HatCell<Number> hat_cell(std::span<const double> knots, Number x) noexcept {
-  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, value_of(x));
-  const auto left = static_cast<std::size_t>(above - knots.begin()) - 1;
+[[nodiscard]] HatCell<Number> hat_cell(std::span<const double> knots, Number x,
+                                       std::size_t near = 0) noexcept {
+  const std::size_t left = cell_of(knots, value_of(x), near);
   return {.left = left, .share = (x - knots[left]) / (knots[left + 1] - knots[left])};
 }
 
 /// The same, held beyond the ends. @param knots ascending; one: a hat that is 1 everywhere
 template <class Number>
-[[nodiscard]] HatCell<Number> held_hat_cell(std::span<const double> knots, Number x) noexcept {
+[[nodiscard]] HatCell<Number> held_hat_cell(std::span<const double> knots, Number x,
+                                            std::size_t near = 0) noexcept {
   if (knots.size() < 2) return {};
-  HatCell<Number> cell = hat_cell(knots, x);
+  HatCell<Number> cell = hat_cell(knots, x, near);
   cell.share = limited(cell.share, 0.0, 1.0);
   return cell;
+}
+
+/// Calls term(column, value) for both hats of a cell, times `factor`; or term.hats(column, share, factor) once, where
+/// the term has that.
+/// @param column of the left hat
+template <class Number, class Factor, class Term>
+void visit_hats(Term& term, std::size_t column, const Number& share,
+                const Factor& factor) noexcept {
+  if constexpr (requires { term.hats(column, share, factor); }) {
+    term.hats(column, share, factor);
+  } else {
+    term(column, (1.0 - share) * factor);
+    term(column + 1, share * factor);
+  }
 }
 
 }  // namespace torsio::detail

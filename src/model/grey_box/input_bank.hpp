@@ -133,8 +133,10 @@ class InputBankTerms {
       const auto cell = detail::held_hat_cell(bank.force_knots, x);
       std::size_t column = first + cell.left;
       for (std::size_t i = 0; i < slips; ++i, column += knots) {
-        term(column, (1.0 - cell.share) * state[i]);
-        if (knots > 1) term(column + 1, cell.share * state[i]);
+        if (knots > 1)
+          detail::visit_hats(term, column, cell.share, state[i]);
+        else
+          term(column, (1.0 - cell.share) * state[i]);
       }
     }
     if (const auto& knots = bank.curve_knots;
