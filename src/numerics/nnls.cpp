@@ -76,45 +76,42 @@ class ActiveSet {
  private:
   [[nodiscard]] bool is_free(Index j) const { return is_free_[static_cast<std::size_t>(j)] != 0; }
 
-  /// The lower Cholesky factor of the passive columns' product, of which only the rows of columns that have
-  /// entered since the last call are computed.
-  [[nodiscard]] auto factor() {
-    const auto count = static_cast<Index>(passive_.size());
-    for (; factored_ < count; ++factored_) {
+  /// Computes the rows of the lower Cholesky factor L of the passive columns' product: only those of columns that
+  /// have entered since the last call.
+  void factor() {
+    for (const auto count = static_cast<Index>(passive_.size()); factored_ < count; ++factored_) {
       const Index j = passive_[static_cast<std::size_t>(factored_)];
-      const Eigen::VectorXd row = along_factored(j);
+      const Eigen::VectorXd row = solved(product_.col(j));
       factor_.row(factored_).head(factored_) = row;
       factor_(factored_, factored_) = std::sqrt(product_(j, j) - row.squaredNorm());
     }
-    return factor_.topLeftCorner(count, count).triangularView<Eigen::Lower>();
   }
 
-  /// Column j in the orthonormal basis of the passive columns that are factored.
-  [[nodiscard]] Eigen::VectorXd along_factored(Index j) const {
-    Eigen::VectorXd along(factored_);
-    for (Index i = 0; i < factored_; ++i)
-      along[i] = product_(passive_[static_cast<std::size_t>(i)], j);
-    if (factored_ > 0)
-      factor_.topLeftCorner(factored_, factored_)
-          .triangularView<Eigen::Lower>()
-          .solveInPlace(along);
-    return along;
+  /// x of L x = the passive elements of `right`, for the columns that are factored.
+  [[nodiscard]] Eigen::VectorXd solved(const Eigen::VectorXd& right) const {
+    Eigen::VectorXd x(factored_);
+    for (Index i = 0; i < factored_; ++i) {
+      const double known = factor_.row(i).head(i).dot(x.head(i));
+      x[i] = (right[passive_[static_cast<std::size_t>(i)]] - known) / factor_(i, i);
+    }
+    return x;
   }
 
   /// What of column j the passive ones leave unexplained, squared, above the limit?
   [[nodiscard]] bool is_independent(Index j) {
     if (!(product_(j, j) > 0.0)) return false;
-    static_cast<void>(factor());
-    return product_(j, j) - along_factored(j).squaredNorm() > kDependentColumn;
+    factor();
+    return product_(j, j) - solved(product_.col(j)).squaredNorm() > kDependentColumn;
   }
 
   [[nodiscard]] Eigen::VectorXd passive_solution() {
-    if (passive_.empty()) return {};
-    const auto lower = factor();
-    Eigen::VectorXd solution = projection_(passive_);
-    lower.solveInPlace(solution);
-    lower.transpose().solveInPlace(solution);
-    return solution;
+    factor();
+    Eigen::VectorXd x = solved(projection_);
+    for (Index i = factored_; i-- > 0;) {
+      x[i] /= factor_(i, i);
+      x.head(i) -= x[i] * factor_.row(i).head(i).transpose();
+    }
+    return x;
   }
 
   void move_to(const Eigen::VectorXd& values) {
@@ -180,8 +177,8 @@ class ActiveSet {
   Eigen::VectorXd projection_;
   Eigen::VectorXd solution_;
   std::vector<Index> passive_;
-  Eigen::MatrixXd factor_;  ///< see `factor`
-  Index factored_ = 0;      ///< its rows that hold for `passive_`
+  RowMajor factor_;     ///< L
+  Index factored_ = 0;  ///< its rows that hold for `passive_`
   double tolerance_ = 0.0;
 };
 

@@ -199,7 +199,7 @@ std::vector<NormalEquations> GreyBoxCandidate::projected(
   std::vector<Index> used;
   for (const ColumnShare& share : shares) used.push_back(static_cast<Index>(share.from));
   std::ranges::sort(used);
-  used.erase(std::ranges::unique(used).begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
   for (ColumnShare& share : shares)
     share.from = static_cast<std::size_t>(
         std::ranges::lower_bound(used, static_cast<Index>(share.from)) - used.begin());

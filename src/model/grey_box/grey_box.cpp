@@ -57,6 +57,8 @@ struct TermSum {
     value += (coefficient(column) * (1.0 - share) + coefficient(column + 1) * share) * factor;
   }
 };
+template <class Coefficient>
+TermSum(const Coefficient&) -> TermSum<Coefficient>;
 
 }  // namespace
 
