@@ -190,7 +190,7 @@ void drop_empty_terms(GreyBox::Parameters& box) {
         if (all(level, j) != 0.0) return false;
     return true;
   };
-  /// Of terms with `columns` each, from column `first` on, those that are not empty.
+  /// The thresholds or time constants of terms that are not empty. @param columns of each term, from `first` on
   const auto not_empty = [&](const std::vector<double>& of_terms, std::size_t first,
                              std::size_t columns, bool may_drop) {
     std::vector<double> used;
