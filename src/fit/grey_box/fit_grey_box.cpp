@@ -12,6 +12,7 @@
 #include "core/report_progress.hpp"
 #include "fit/common/held_out.hpp"
 #include "fit/grey_box/box_average.hpp"
+#include "fit/grey_box/empty_terms.hpp"
 #include "fit/grey_box/grey_box_search.hpp"
 #include "fit/grey_box/late_target.hpp"
 #include "fit/grey_box/residual_choice.hpp"
@@ -175,49 +176,6 @@ void take_average(ChosenBox& box, const TrainingData& data) {
                   average->boxes - 1, average->held_out_rmse));
 }
 
-/// Leaves out slip elements and branches whose coefficients are all 0, as bounds often make them: each would take time in
-/// every step. A residual keeps the slip elements, which are its inputs.
-void drop_empty_terms(GreyBox::Parameters& box) {
-  GreyBoxTerms::Structure& terms = box.terms;
-  const Matrix& all = box.coefficients.values;
-  std::vector<std::size_t> kept;  // columns
-  const auto keep_columns = [&](std::size_t from, std::size_t to) {
-    for (std::size_t j = from; j < to; ++j) kept.push_back(j);
-  };
-  const auto is_empty = [&](std::size_t from, std::size_t to) {
-    for (std::size_t level = 0; level < all.rows; ++level)
-      for (std::size_t j = from; j < to; ++j)
-        if (all(level, j) != 0.0) return false;
-    return true;
-  };
-  /// The thresholds or time constants of terms that are not empty. @param columns of each term, from `first` on
-  const auto not_empty = [&](const std::vector<double>& of_terms, std::size_t first,
-                             std::size_t columns, bool may_drop) {
-    std::vector<double> used;
-    for (std::size_t i = 0; i < of_terms.size(); ++i) {
-      const std::size_t from = first + i * columns;
-      if (may_drop && is_empty(from, from + columns)) continue;
-      keep_columns(from, from + columns);
-      used.push_back(of_terms[i]);
-    }
-    return used;
-  };
-  const std::size_t after = terms.first_slope();
-  const std::size_t end = terms.columns();
-  keep_columns(0, terms.first_slip());
-  std::vector<double> thresholds =
-      not_empty(terms.thresholds, terms.first_slip(), terms.friction_knots.size(), !box.residual);
-  std::vector<double> time_constants_s =
-      not_empty(terms.time_constants_s, terms.first_relaxation(), 1, true);
-  keep_columns(after, end);
-  Matrix values(all.rows, kept.size());
-  for (std::size_t level = 0; level < all.rows; ++level)
-    for (std::size_t j = 0; j < kept.size(); ++j) values(level, j) = all(level, kept[j]);
-  terms.thresholds = std::move(thresholds);
-  terms.time_constants_s = std::move(time_constants_s);
-  box.coefficients.values = std::move(values);
-}
-
 /// Error bars as wide as the error on the most different part of the data.
 void widen(ChosenBox& box, const StrokeErrors& strokes) {
   const char* widest = nullptr;
@@ -265,7 +223,7 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
   if (options.average) take_average(box, data);
   const double without = fitted.held_out_rmse;
   if (may_learn) learn_residual(fitted, data, options, context);
-  drop_empty_terms(fitted.parameters);
+  fitted.parameters = without_empty_terms(std::move(fitted.parameters));
   // What a network adds is as good there as elsewhere.
   const double gain = fitted.held_out_rmse / without;
   box.spans_rmse *= gain;

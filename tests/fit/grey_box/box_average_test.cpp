@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "fit/grey_box/empty_terms.hpp"
 #include "fit/grey_box/fit_grey_box.hpp"
 #include "numerics/thread_share.hpp"
 #include "support/example_data.hpp"
@@ -117,10 +118,12 @@ TEST(BoxAverage, IsLeftOutOnRequest) {
     return fit_grey_box(data, {.average = averages, .residual = ResidualKind::none})
         .parameters.coefficients.values.values;
   };
-  EXPECT_EQ(coefficients(false), search.fitted(chosen.choice).coefficients.values.values);
-  EXPECT_EQ(
-      coefficients(true),
-      box_average(search, chosen, data, kReversalShare)->parameters.coefficients.values.values);
+  const auto expected = [](const GreyBox::Parameters& box) {
+    return without_empty_terms(box).coefficients.values.values;
+  };
+  EXPECT_EQ(coefficients(false), expected(search.fitted(chosen.choice)));
+  EXPECT_EQ(coefficients(true),
+            expected(box_average(search, chosen, data, kReversalShare)->parameters));
 }
 
 TEST(BoxAverage, OfPassiveBoxesIsPassive) {
@@ -131,6 +134,27 @@ TEST(BoxAverage, OfPassiveBoxesIsPassive) {
   const GreyBoxTerms::Structure& terms = average->parameters.terms;
   for (std::size_t j = terms.first_slip(); j < terms.first_slope(); ++j)
     EXPECT_GE(average->parameters.coefficients.values(0, j), 0.0) << j;
+}
+
+TEST(WithoutEmptyTerms, EstimatesTheSameWithFewerTerms) {
+  const TrainingData data = noisy_data();
+  const GreyBoxSearch search(data, "", kReversalShare);
+  GreyBox::Parameters box =
+      search.fitted({.curve = 2, .slips = 0b01010100, .forces = 1, .branches = 1});
+  const std::size_t knots = box.terms.friction_knots.size();
+  const std::size_t slip = box.terms.first_slip();
+  const std::size_t branch = box.terms.first_relaxation();
+  for (std::size_t j = 0; j < 3; ++j) {  // the second slip element and the second branch are empty
+    box.coefficients.values(0, branch + j) = j == 1 ? 0.0 : 50.0;
+    for (std::size_t k = 0; k < knots; ++k)
+      box.coefficients.values(0, slip + j * knots + k) = j == 1 ? 0.0 : 0.5;
+  }
+  const GreyBox::Parameters fewer = without_empty_terms(box);
+  EXPECT_EQ(fewer.terms.thresholds,
+            (std::vector{box.terms.thresholds[0], box.terms.thresholds[2]}));
+  EXPECT_EQ(fewer.terms.time_constants_s,
+            (std::vector{box.terms.time_constants_s[0], box.terms.time_constants_s[2]}));
+  EXPECT_EQ(estimates_of(fewer, data), estimates_of(box, data));
 }
 
 }  // namespace
