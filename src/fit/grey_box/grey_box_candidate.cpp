@@ -197,6 +197,7 @@ std::vector<NormalEquations> GreyBoxCandidate::projected(
   std::vector<ColumnShare> shares = this->map();
   // A candidate uses few of the finest terms, so those are taken out first.
   std::vector<Index> used;
+  used.reserve(shares.size());
   for (const ColumnShare& share : shares) used.push_back(static_cast<Index>(share.from));
   std::ranges::sort(used);
   used.erase(std::unique(used.begin(), used.end()), used.end());
