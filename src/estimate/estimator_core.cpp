@@ -306,9 +306,11 @@ Estimate EstimatorCore::blended(Features features, double value, double std_dev,
   const double fallback = fallback_value(features);
   // The second moment about the mean of a draw from the model with probability 1 - w, else from
   // the fallback: the two variances, and how far the two disagree.
-  const double spread = std::hypot(std::sqrt(1.0 - weight) * std_dev,
-                                   std::sqrt(weight) * evidence(settings_.fallback.residual_std),
-                                   std::sqrt(weight * (1.0 - weight)) * (value - fallback));
+  const double of_fallback = evidence(settings_.fallback.residual_std);
+  const double apart = value - fallback;
+  const double spread =
+      std::sqrt((1.0 - weight) * std_dev * std_dev +
+                weight * (of_fallback * of_fallback + (1.0 - weight) * apart * apart));
   return {.value = std::lerp(value, fallback, weight), .std_dev = evidence(spread)};
 }
 

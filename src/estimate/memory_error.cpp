@@ -139,11 +139,11 @@ void MemoryError::update_bound() noexcept {
   }
   for (std::size_t k = 0; k < share_.size(); ++k) bound_ += memory_.relaxations[k].gain * share_[k];
   const double covered = highest_ >= lowest_ ? highest_ - lowest_ : 0.0;
+  const double unknown = std::min(width_, unknown_travel_);
   for (std::size_t i = 0; i < others_.size(); ++i) {
     const SlipMemory& slip = memory_.slips[i];
     if (slip.input == 0) {
-      bound_ +=
-          slip.gain * std::max(0.0, std::min({slip.travel, width_, unknown_travel_}) - covered);
+      bound_ += slip.gain * std::max(0.0, std::min(slip.travel, unknown) - covered);
     } else {
       bound_ += slip.gain * others_[i].left();
     }

@@ -194,22 +194,26 @@ ModelMemory GreyBox::memory(const InputRanges& ranges) const {
   return memory;
 }
 
+/// @param use is called with the coefficients at these features, as a function of the column
+template <class Use>
+auto GreyBox::with_coefficients(Features features, const Use& use) const noexcept {
+  const CoefficientSchedule& schedule = coefficients_.schedule();
+  if (!schedule.scheduled) {
+    // Most are not, and interpolation takes a third of the step.
+    const auto row = schedule.values.row(0);
+    return use([row](std::size_t column) { return row[column]; });
+  }
+  const auto at = coefficients_.locate(features);
+  return use([&](std::size_t column) { return coefficients_.coefficient(at, column); });
+}
+
 Estimate GreyBox::step(Features features) noexcept {
   terms_.move(features);
-  const auto sum = [&](const auto& coefficient) {
+  const double value = with_coefficients(features, [&](const auto& coefficient) {
     TermSum terms{coefficient};
     terms_.visit(features, terms);
     return terms.value;
-  };
-  double value = 0.0;
-  if (!coefficients_.schedule().scheduled) {
-    // Most are not, and interpolation takes a third of the step.
-    const auto row = coefficients_.schedule().values.row(0);
-    value = sum([row](std::size_t column) { return row[column]; });
-  } else {
-    const auto at = coefficients_.locate(features);
-    value = sum([&](std::size_t column) { return coefficients_.coefficient(at, column); });
-  }
+  });
   return {.value = value + residual(features)};
 }
 
@@ -271,14 +275,9 @@ double GreyBox::near_root(const Error& error_at, double rise, double wanted) con
 
 Estimate GreyBox::invert(double target, Features features) noexcept {
   const CoefficientSchedule& schedule = coefficients_.schedule();
-  if (!schedule.scheduled) {
-    const auto row = schedule.values.row(0);
-    return solved([row](std::size_t column) { return row[column]; }, target, features);
-  }
-  if (schedule.feature == 0) return detail::no_inverse(features);
-  const auto at = coefficients_.locate(features);
-  return solved([&](std::size_t column) { return coefficients_.coefficient(at, column); }, target,
-                features);
+  if (schedule.scheduled && schedule.feature == 0) return detail::no_inverse(features);
+  return with_coefficients(
+      features, [&](const auto& coefficient) { return solved(coefficient, target, features); });
 }
 
 template <class Coefficient>

@@ -280,6 +280,8 @@ class GreyBox {
   static constexpr double kInversionReach = 1.5;  ///< further than an estimator uses the value
 
  private:
+  template <class Use>
+  [[nodiscard]] auto with_coefficients(Features features, const Use& use) const noexcept;
   template <class Coefficient>
   [[nodiscard]] Estimate solved(const Coefficient& coefficient, double target,
                                 Features features) noexcept;
