@@ -31,7 +31,7 @@ ready() {
 ready || exit 1
 record() {
   for trial in 1 2 3 4; do
-    rm -f $2
+    rm -f $2 $2.tsr
     if $T connect play $1_move.csv $L --valid 1s --bridge 50ms -o $2 >note.txt 2>&1; then
       grep -q "are nan" note.txt || return 0
     else
