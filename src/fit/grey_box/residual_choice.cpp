@@ -138,17 +138,23 @@ double root_mean_square(const TrainingData& data) {
 struct Candidate {
   ResidualKind kind = ResidualKind::none;
   std::size_t degree = 0;  ///< products have one
-
   /// A network predicts other motions of the same kind well where it predicts blocks, and seldom a whole recording of
-  /// another amplitude; products and processes that predict this predict more.
-  [[nodiscard]] bool is_tried_on_blocks() const { return kind == ResidualKind::mlp; }
+  /// another amplitude; what predicts this predicts more.
+  bool is_tried_on_blocks = false;
+
   [[nodiscard]] const HeldOutParts& parts_of(const ResidualData& left) const {
-    return is_tried_on_blocks() ? left.of_blocks : left.of_records;
+    return is_tried_on_blocks ? left.of_blocks : left.of_records;
+  }
+  /// What such a one gains on two recordings, each predicted from the other, did not carry over to other motions.
+  [[nodiscard]] bool needs_all_trials() const {
+    return kind == ResidualKind::gp || (kind == ResidualKind::mlp && !is_tried_on_blocks);
   }
 };
 
-constexpr std::array kCandidates{Candidate{ResidualKind::mlp}, Candidate{ResidualKind::products, 2},
-                                 Candidate{ResidualKind::products, 3}, Candidate{ResidualKind::gp}};
+constexpr std::array kCandidates{
+    Candidate{.kind = ResidualKind::mlp, .is_tried_on_blocks = true},
+    Candidate{.kind = ResidualKind::mlp}, Candidate{.kind = ResidualKind::products, .degree = 2},
+    Candidate{.kind = ResidualKind::products, .degree = 3}, Candidate{.kind = ResidualKind::gp}};
 
 std::string text_of(const Candidate& candidate) {
   switch (candidate.kind) {
@@ -282,8 +288,7 @@ std::array<Gain, kCandidates.size()> tried(const ResidualData& left, const GreyB
   std::vector<Job> jobs;
   for (std::size_t c = 0; c < kCandidates.size(); ++c) {
     const std::size_t trials = trials_in(kCandidates.at(c).parts_of(left));
-    // What a process gains on two recordings, each predicted from the other, did not carry over to other motions.
-    if (kCandidates.at(c).kind == ResidualKind::gp && trials < kTrials) continue;
+    if (kCandidates.at(c).needs_all_trials() && trials < kTrials) continue;
     for (std::size_t t = 0; t < trials; ++t) jobs.push_back({c, t});
   }
   std::array<Scores, kCandidates.size()> scores{};
@@ -309,9 +314,9 @@ std::array<Gain, kCandidates.size()> tried(const ResidualData& left, const GreyB
 }
 
 std::string note_of(const Candidate& candidate, const Gain& gain, bool has_records) {
-  const char* const held_out = candidate.is_tried_on_blocks() ? "blocks"
-                               : has_records                  ? "recordings"
-                                                              : "fifths";
+  const char* const held_out = candidate.is_tried_on_blocks ? "blocks"
+                               : has_records                ? "recordings"
+                                                            : "fifths";
   const double share = std::sqrt(1.0 - gain.mean);
   return fmt::format(
       "{} for the residual was {}: on held-out {} it changes the RMSE by {:+.1f} % (standard error "
@@ -320,13 +325,13 @@ std::string note_of(const Candidate& candidate, const Gain& gain, bool has_recor
       100.0 * (share - 1.0), 50.0 * gain.std_error / share);
 }
 
-/// The process if it is worthwhile, since it only describes what is near its data, else the better products, else the
-/// network; if none is, the best one of the former.
+/// The process if it is worthwhile, since it only describes what is near its data, else the best of the others that were
+/// tried on recordings, else the network that was tried on blocks; if none is, the best one of the former.
 std::size_t place_of_best(const std::array<Gain, kCandidates.size()>& gains) {
   const auto better = [&](std::size_t a, std::size_t b) {
     const auto rank = [&](std::size_t c) {
       const bool is_worthwhile = gains.at(c).is_worthwhile();
-      return std::tuple(is_worthwhile, !kCandidates.at(c).is_tried_on_blocks(),
+      return std::tuple(is_worthwhile, !kCandidates.at(c).is_tried_on_blocks,
                         is_worthwhile && kCandidates.at(c).kind == ResidualKind::gp,
                         gains.at(c).mean);
     };
