@@ -145,7 +145,8 @@ struct Candidate {
   [[nodiscard]] const HeldOutParts& parts_of(const ResidualData& left) const {
     return is_tried_on_blocks ? left.of_blocks : left.of_records;
   }
-  /// What such a one gains on two recordings, each predicted from the other, did not carry over to other motions.
+  /// What a process gains on two recordings, each predicted from the other, did not carry over to other motions; the
+  /// same is asked of a network.
   [[nodiscard]] bool needs_all_trials() const {
     return kind == ResidualKind::gp || (kind == ResidualKind::mlp && !is_tried_on_blocks);
   }
