@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/cells.hpp"
 #include "core/root_of_squares.hpp"
 #include "estimate/estimator_checks.hpp"
 #include "estimate/guard_listing.hpp"
@@ -296,7 +297,7 @@ double EstimatorCore::widened(double std_dev, const Excursion& excursion,
                          std::min(excursion.first, 1.0) * departure);
 }
 
-double EstimatorCore::model_std_dev(const Estimate& raw_estimate) const noexcept {
+double EstimatorCore::model_std_dev(const Estimate& raw_estimate) noexcept {
   const double own = evidence(settings_.output.error_bar_factor * raw_estimate.std_dev);
   return std::isnan(own) ? residual_std_at(raw_estimate.value) : own;
 }
@@ -334,13 +335,11 @@ double EstimatorCore::stroke_novelty() const noexcept {
   return share > 1.0 ? (share - 1.0) * (share - 1.0) / share : 0.0;
 }
 
-double EstimatorCore::residual_std_at(double value) const noexcept {
+double EstimatorCore::residual_std_at(double value) noexcept {
   const ResidualTable& table = settings_.residuals;
   if (table.std_dev.empty()) return kNotMeasured;
-  const auto inner_begin = table.edges.begin() + 1;
-  const auto inner_end = table.edges.end() - 1;
-  const auto region = std::upper_bound(inner_begin, inner_end, value) - inner_begin;
-  return evidence(table.std_dev[static_cast<std::size_t>(region)]);
+  residual_region_ = cell_of(table.edges, value, residual_region_);
+  return evidence(table.std_dev[residual_region_]);
 }
 
 GuardListing EstimatorCore::listing() const {

@@ -33,7 +33,8 @@ struct SensorUncertainty {
 
   [[nodiscard]] bool is_stated() const noexcept { return constant > 0.0 || relative > 0.0; }
   [[nodiscard]] double at(double reading) const noexcept {
-    return std::hypot(constant, relative * reading);
+    const double share = relative * reading;
+    return std::sqrt(constant * constant + share * share);
   }
   /// The rest of an error bar that contains it: the error against the same sensor. NaN of NaN.
   [[nodiscard]] double taken_out_of(double std_dev, double reading) const noexcept {

@@ -277,7 +277,7 @@ class EstimatorCore {
   [[nodiscard]] static double widened(double std_dev, const Excursion& excursion,
                                       double departure) noexcept TORSIO_REALTIME;
   /// The error bar of the residuals in the region of `value`; NaN: none.
-  [[nodiscard]] double residual_std_at(double value) const noexcept TORSIO_REALTIME;
+  [[nodiscard]] double residual_std_at(double value) noexcept TORSIO_REALTIME;
   /// A raw input has jumped, and no tick since then has been inside the ranges: the last conditioned one
   /// must not be used.
   [[nodiscard]] bool is_in_jump() const noexcept { return in_jump_; }
@@ -358,7 +358,7 @@ class EstimatorCore {
                 const std::function<ModelMemory(const InputRanges&)>& memory);
 
   /// The error bar of the model's output: its own, or that of its region.
-  [[nodiscard]] double model_std_dev(const Estimate& raw_estimate) const noexcept;
+  [[nodiscard]] double model_std_dev(const Estimate& raw_estimate) noexcept;
   /// Blends the model's value with the fallback, whose share is `weight` in 0..1.
   [[nodiscard]] Estimate blended(Features features, double value, double std_dev,
                                  double weight) const noexcept;
@@ -425,6 +425,7 @@ class EstimatorCore {
   std::vector<double> missed_parts_;  ///< by which the features were limited
   std::vector<double> widths_;        ///< widths of the ranges of the features
   double start_std_dev_ = 0.0;
+  std::size_t residual_region_ = 0;  ///< the region to look at first
   StrokeClock strokes_{0.0};
   double longest_stroke_ = 0.0;  ///< the longest in training [ticks]; 0: strokes are not followed
   std::uint64_t state_identity_ = 0;

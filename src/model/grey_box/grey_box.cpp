@@ -72,6 +72,9 @@ GreyBoxTerms::GreyBoxTerms(Structure structure)
     states += bank.states();
   }
   state_.assign(states, 0.0);
+  constexpr double kLargest = std::numeric_limits<double>::max();  // 0 times it is 0
+  for (const double scale : structure_.rate_scales)
+    rate_factors_.push_back(scale > 0.0 ? std::min(1.0 / scale, kLargest) : 0.0);
 }
 
 void GreyBoxTerms::reset() noexcept {
@@ -237,9 +240,9 @@ double GreyBox::others(const Coefficient& coefficient, Features features) const 
   double value = 0.0;
   for (std::size_t j = 1; j < features.size(); ++j) {
     value += coefficient(structure.first_slope() + j) * features[j];
-    if (const double scale = structure.rate_scales[j]; scale > 0.0)
+    if (const double factor = terms_.rate_factors()[j]; factor > 0.0)
       value += coefficient(structure.first_coulomb() + j) *
-               detail::hyperbolic_tangent(features[j] / scale);
+               detail::hyperbolic_tangent(features[j] * factor);
   }
   return value;
 }

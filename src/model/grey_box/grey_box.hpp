@@ -89,6 +89,8 @@ class GreyBoxTerms {
   explicit GreyBoxTerms(Structure structure);
 
   [[nodiscard]] const Structure& structure() const noexcept { return structure_; }
+  /// 1 / u_l of each input; 0: no Coulomb term.
+  [[nodiscard]] std::span<const double> rate_factors() const noexcept { return rate_factors_; }
 
   /// As if x had long been where it is at the next `move`.
   void reset() noexcept;
@@ -124,8 +126,8 @@ class GreyBoxTerms {
     visit_banks(last_, features, bank_state(), term);
     for (std::size_t j = 1; j < features.size(); ++j) {
       term(structure_.first_slope() + j, features[j]);
-      if (const double scale = structure_.rate_scales[j]; scale > 0.0)
-        term(structure_.first_coulomb() + j, detail::hyperbolic_tangent(features[j] / scale));
+      if (const double factor = rate_factors_[j]; factor > 0.0)
+        term(structure_.first_coulomb() + j, detail::hyperbolic_tangent(features[j] * factor));
     }
   }
 
@@ -188,9 +190,10 @@ class GreyBoxTerms {
   }
 
   Structure structure_;
-  SlipBank slips_;             ///< s_i / r_i
-  std::vector<double> decay_;  ///< e^(-h/T_j)
-  std::vector<double> gain_;   ///< (T_j / h) (1 - e^(-h/T_j))
+  SlipBank slips_;                    ///< s_i / r_i
+  std::vector<double> decay_;         ///< e^(-h/T_j)
+  std::vector<double> gain_;          ///< (T_j / h) (1 - e^(-h/T_j))
+  std::vector<double> rate_factors_;  ///< a product takes a tenth of the time of a division
   std::vector<InputBankTerms> banks_;
   std::vector<double> state_;
   double last_ = 0.0;

@@ -209,11 +209,11 @@ void GreyBoxRows::add_rates(Block& value) const noexcept {
     const Block& u = inputs_[j];
     const double slope = coefficients_[structure.first_slope() + j];
     for (std::size_t n = 0; n < kGroup; ++n) value[n] += slope * u[n];
-    const double scale = structure.rate_scales[j];
-    if (!(scale > 0.0)) continue;
+    const double factor = terms_.rate_factors()[j];
+    if (!(factor > 0.0)) continue;
     const double friction = coefficients_[structure.first_coulomb() + j];
     for (std::size_t n = 0; n < kGroup; ++n)
-      value[n] += friction * detail::hyperbolic_tangent(u[n] / scale);
+      value[n] += friction * detail::hyperbolic_tangent(u[n] * factor);
   }
 }
 

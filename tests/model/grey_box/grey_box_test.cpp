@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -73,6 +74,24 @@ TEST(GreyBox, ABranchRelaxesExactlyOnARamp) {
     const double t = 0.01 * n;
     EXPECT_NEAR(estimate(box, kRate * t),
                 2.0 * kRate * kTimeConstant_s * (1.0 - std::exp(-t / kTimeConstant_s)), 1e-13);
+  }
+}
+
+TEST(GreyBox, DryFrictionSaturatesAtAnyRateScale) {
+  for (const double scale : {0.05, std::numeric_limits<double>::denorm_min()}) {
+    GreyBox::Parameters parameters;
+    parameters.terms = {.curve_knots = {-1.0, 1.0},
+                        .thresholds = {},
+                        .friction_knots = {0.0},
+                        .time_constants_s = {},
+                        .rate_scales = {0.0, scale},
+                        .sample_period_s = 0.01};
+    parameters.coefficients.values = Matrix(1, parameters.terms.columns());
+    parameters.coefficients.values(0, parameters.terms.first_coulomb() + 1) = 3.0;
+    GreyBox box(parameters);
+    EXPECT_EQ(box.step(std::array{0.0, 0.0}).value, 0.0) << scale;
+    EXPECT_DOUBLE_EQ(box.step(std::array{0.0, 10.0}).value, 3.0) << scale;
+    EXPECT_DOUBLE_EQ(box.step(std::array{0.0, -10.0}).value, -3.0) << scale;
   }
 }
 
