@@ -1,6 +1,7 @@
 #include "core/quantity.hpp"
 
 #include <charconv>
+#include <cmath>
 #include <string>
 
 #include "core/trimmed.hpp"
@@ -14,7 +15,8 @@ double signed_quantity_with_unit(std::string_view text, std::string_view expecte
   const std::string_view all = trimmed(text);
   double number = 0.0;
   const auto [end, code] = std::from_chars(all.data(), all.data() + all.size(), number);
-  const bool is_bare = code == std::errc{} && end == all.data() + all.size();
+  const bool is_bare =
+      std::isfinite(number) && code == std::errc{} && end == all.data() + all.size();
   const bool is_same_in_each_unit = expected_si == "1" || number == 0.0;
   if (is_bare && !is_same_in_each_unit)
     throw UsageError(

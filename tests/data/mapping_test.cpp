@@ -654,10 +654,14 @@ TEST(Mapping, RefusesUncertaintiesThatMeanNothing) {
   EXPECT_THAT(message("class: 0.2%"), HasSubstr("the range of the sensor beside it"));
   EXPECT_THAT(message("class: 0.2%"), HasSubstr("class: 0.2%, range: 100Nm"));
   EXPECT_THAT(message("range: 100Nm, gain: 1%"), HasSubstr("class: beside range:"));
-  EXPECT_THAT(message("class: 0.2, range: 100Nm"), HasSubstr("Write 0.2%"));
+  EXPECT_THAT(message("class: 0.2, range: 100Nm"),
+              HasSubstr("Write 0.2% for 0.2 percent of the range, or 20% for 0.2 of it."));
   EXPECT_THAT(message("class: CLASS, range: RANGE"), HasSubstr("found 'CLASS'"));
   EXPECT_THAT(message("class: CLASS, range: RANGE"), testing::Not(HasSubstr("CLASS%")));
-  EXPECT_THAT(message("gain: 0.005"), HasSubstr("Write 0.5% for a share of 0.005, or 0.005%."));
+  EXPECT_THAT(message("gain: 0.005"),
+              HasSubstr("Write 0.005% for 0.005 percent of the reading, or 0.5% for 0.005 of it."));
+  EXPECT_THAT(message("class: 0.2%, range: 0Nm"), HasSubstr("expected a range above 0"));
+  EXPECT_THAT(message("zero: nan"), testing::Not(HasSubstr("nanNm")));
   EXPECT_THAT(message("gain: 0.5Nm"), HasSubstr("a share of the reading in %"));
   EXPECT_THAT(message("gain: -1%"), HasSubstr("from 0% to below 100%"));
   EXPECT_THAT(message("gain: 100%"), HasSubstr("from 0% to below 100%"));
@@ -667,8 +671,13 @@ TEST(Mapping, RefusesUncertaintiesThatMeanNothing) {
   EXPECT_THAT(message("zero: -0.1Nm"), HasSubstr("not negative"));
   EXPECT_THAT(message("zero: 1e300Nm"), HasSubstr("at most 1e+12 Nm"));
   EXPECT_THAT(message("mountign: 1%"), HasSubstr("Did you mean 'mounting'?"));
-  EXPECT_THAT(message(""), HasSubstr("at least one of class:"));
-  EXPECT_THAT(message("gain: 0%"), HasSubstr("at least one of class:"));
+  EXPECT_THAT(message(""), HasSubstr("a number above 0 for class:"));
+  EXPECT_THAT(message("gain: 0%"), HasSubstr("a number above 0 for class:"));
+  EXPECT_THAT(test::error_message([] {
+                (void)parse_mapping("uncertainty: {class: 0.2%, range: 100Nm}", "m.yaml");
+              }),
+              testing::AllOf(HasSubstr("the channel of the sensor is missing"),
+                             HasSubstr("uncertainty: {torque_Nm: {class: 0.2%, range: 100Nm}}")));
   EXPECT_THAT(test::error_message([] {
                 (void)parse_mapping("uncertainty: {torque_Nm: {gain: 1%}, torque_mNm: {gain: 2%}}",
                                     "m.yaml");

@@ -58,7 +58,7 @@ TEST(SensorUncertainty, IsTakenOutOfAnErrorBarThatContainsIt) {
 
 TEST(SensorUncertainty, IsWrittenWithItsUnits) {
   EXPECT_EQ(uncertainty_text({.constant = 0.208, .relative = 0.00583}, "torque_Nm"),
-            "0.21 Nm + 0.58 % of the value (standard uncertainty)");
+            "sqrt((0.21 Nm)^2 + (0.58 % of the value)^2) (standard uncertainty)");
   EXPECT_EQ(uncertainty_text({.constant = 2.0}, "force_N"), "2 N (standard uncertainty)");
   EXPECT_EQ(uncertainty_text({.relative = 0.01}, "force_N"),
             "1 % of the value (standard uncertainty)");

@@ -45,9 +45,10 @@ TEST(TrainModel, TakesTheLargestUncertaintyOfTheTargetThatATrainingRecordStates)
   TrainedModel trained = train_model(dataset, choice, 1);
   EXPECT_EQ(trained.file.settings.target_uncertainty,
             (SensorUncertainty{.constant = 0.2, .relative = 0.01}));
-  EXPECT_EQ(trained.notes.front(),
-            "the error bars contain the error of the reference sensor as it was stated, 0.2 Nm + 1 "
-            "% of the value (standard uncertainty); 1 of 2 recordings state none");
+  EXPECT_EQ(
+      trained.notes.front(),
+      "the error bars contain the error of the reference sensor as it was stated, sqrt((0.2 Nm)^2 "
+      "+ (1 % of the value)^2) (standard uncertainty); 1 of 2 recordings state none");
   EXPECT_EQ(trained.notes.at(1),
             "the uncertainty of gear_angle_rad has no effect on the error bars: only that of the "
             "target, torque_Nm has one");

@@ -41,8 +41,9 @@ TEST(ModelDescription, StatesTheUncertaintyOfTheReferenceSensor) {
   EXPECT_THAT(model_description_json(file, slow_cycle(file)),
               HasSubstr("\"target_uncertainty\": null"));
   file.settings.target_uncertainty = {.constant = 0.21, .relative = 0.006};
-  EXPECT_THAT(described(file), HasSubstr("reference sensor: 0.21 Nm + 0.6 % of the value (standard "
-                                         "uncertainty), as stated with the recordings"));
+  EXPECT_THAT(described(file),
+              HasSubstr("reference sensor: sqrt((0.21 Nm)^2 + (0.6 % of the value)^2) "
+                        "(standard uncertainty), as stated with the recordings"));
   EXPECT_THAT(model_description_json(file, slow_cycle(file)), HasSubstr("\"relative\": 0.006"));
 }
 

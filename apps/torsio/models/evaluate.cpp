@@ -1,7 +1,10 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/data_flags.hpp"
 #include "common/model_doubts.hpp"
@@ -14,6 +17,7 @@
 #include "report/html/model_report.hpp"
 #include "report/model_description.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/provenance.hpp"
 #include "torsio/data/write.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
@@ -50,6 +54,18 @@ torsio::Recording prediction_recording(const torsio::ScoredRun& run) {
   result.add(std::move(std_dev));
   result.add(std::move(fault));
   return result;
+}
+
+/// Of which part of the error bars the shares are without, where the sensor is that of the training.
+std::string common_error_text(const std::vector<torsio::ScoredRun>& runs,
+                              const std::string& target) {
+  const auto run = std::ranges::find_if(
+      runs, [](const torsio::ScoredRun& each) { return each.common.is_stated(); });
+  if (run == runs.end()) return {};
+  return fmt::format(
+      "in 1 sd, in 2 sd: without {} of the reference sensor, whose error these recordings contain, "
+      "too.\nThe error bars of --predictions contain it.\n",
+      torsio::uncertainty_text(run->common, target));
 }
 
 /// Without recordings they would be ignored.
@@ -109,7 +125,8 @@ void run(EvaluateFlags& flags) {
   warn_of_another_unit(file, dataset);
   if (!flags.predictions.empty())
     torsio::write_recording(prediction_recording(runs.front()), flags.predictions);
-  if (flags.json.wants_tables()) print(evaluation_text(results));
+  if (flags.json.wants_tables())
+    print(evaluation_text(results) + common_error_text(runs, dataset.target));
   flags.json.write(torsio::results_json(results));
   if (flags.report.is_wanted())
     flags.report.write(

@@ -57,8 +57,7 @@ struct SensorUncertainty {
   return {std::max(first.constant, second.constant), std::max(first.relative, second.relative)};
 }
 
-/// "0.21 Nm + 0.6 % of the value (standard uncertainty)", of a channel's sensor; the variances of the
-/// two parts add. Empty: not stated.
+/// "sqrt((0.21 Nm)^2 + (0.6 % of the value)^2) (standard uncertainty)", of a channel's sensor. Empty: not stated.
 [[nodiscard]] std::string uncertainty_text(const SensorUncertainty& sensor,
                                            std::string_view channel);
 

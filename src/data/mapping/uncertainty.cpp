@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -18,12 +19,13 @@ namespace {
 
 constexpr double kLargestReading = 1e12;  // in the SI unit of the channel
 
-/// What to write for a share without %. A class is stated in percent, also where it is written as a bare number.
-std::string advice_for(std::string_view share, std::string_view of, const std::string& place) {
-  if (share.find_first_not_of("0123456789.") != std::string_view::npos) return "";
-  if (of == "range") return fmt::format("Write {}% for class {}.", share, share);
-  return fmt::format("Write {:g}% for a share of {}, or {}%.",
-                     100.0 * si_quantity(share, "1", place), share, share);
+constexpr std::array<std::string_view, 5> kEntries = {"class", "range", "gain", "mounting", "zero"};
+
+/// What to write for a number without %, which may be percent (most classes are written so) or a share.
+std::string advice_for(std::string_view number, std::string_view of, const std::string& place) {
+  if (number.find_first_not_of("0123456789.") != std::string_view::npos) return "";
+  return fmt::format("Write {}% for {} percent of the {}, or {:g}% for {} of it.", number, number,
+                     of, 100.0 * si_quantity(number, "1", place), number);
 }
 
 /// "0.5%" as 0.5.
@@ -47,14 +49,21 @@ double reading(const YamlValue& value, std::string_view si_unit) {
 }
 
 UncertaintyRule rule_of(const std::string& name, const YamlValue& yaml) {
+  if (std::ranges::find(kEntries, name) != kEntries.end())
+    throw Error({.place = yaml.place(),
+                 .problem = "the channel of the sensor is missing",
+                 .found = name + ":",
+                 .advice = "Name it before its entries:  uncertainty: {torque_Nm: {class: 0.2%, "
+                           "range: 100Nm}}"});
   UncertaintyRule rule{.channel = si_channel_name(name, yaml.place())};
   const std::string unit(split_channel_name(rule.channel)->unit->si_suffix);
-  yaml.allow_only({"class", "range", "gain", "mounting", "zero"});
+  yaml.allow_only(std::vector<std::string>(kEntries.begin(), kEntries.end()));
   const auto accuracy_class = yaml.find("class");
   const auto range = yaml.find("range");
   if (accuracy_class) rule.class_percent = percent(*accuracy_class, "range");
   if (range) rule.range = reading(*range, unit);
-  if (accuracy_class && !(rule.range > 0.0))
+  if (range && !(rule.range > 0.0)) range->refuse("a range above 0");
+  if (accuracy_class && !range)
     accuracy_class->refuse("the range of the sensor beside it",
                            fmt::format("A class is a share of the range:  class: {}, range: 100{}",
                                        accuracy_class->text(), unit));
@@ -65,7 +74,7 @@ UncertaintyRule rule_of(const std::string& name, const YamlValue& yaml) {
   if (const auto zero = yaml.find("zero")) rule.zero = reading(*zero, unit);
   if (!rule.combined().is_stated())
     yaml.refuse(
-        fmt::format("at least one of class: with range:, gain:, mounting: and zero:, as  "
+        fmt::format("a number above 0 for class: with range:, gain:, mounting: or zero:, as  "
                     "{{class: 0.2%, range: 100{0}, gain: 0.5%, zero: 0.1{0}}}",
                     unit));
   return rule;
