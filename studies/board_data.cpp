@@ -136,9 +136,11 @@ std::string left_out(const BoardSource& source, const std::string& folder) {
                             : std::filesystem::is_directory(variable)
                                 ? variable
                                 : fmt::format("{}, which is not a folder", variable);
-  return fmt::format("{} is missing: fetch it from {}, and put it into {}/{} (TORSIO_DATA is {})",
-                     missing, source.address, folder.empty() ? "$TORSIO_DATA" : folder,
-                     source.folder, state);
+  const std::string place = folder.empty() ? "$TORSIO_DATA" : folder;
+  return fmt::format(
+      "{} is missing: fetch it from {}, and write it to {}/{} with  tools/board_files ORIGINALS {} "
+      " (TORSIO_DATA is {})",
+      missing, source.address, place, source.folder, place, state);
 }
 
 ComparisonCase board_case(const BoardSet& set, const Progress& progress) {

@@ -23,12 +23,12 @@ figures, the families of torsio, and the rows of all who joined, lowest error fi
     torsio reproduce board --recorded      # the tables of this page, without a fit and without recordings
 
 The recordings are not part of torsio. They are read from the folder that `TORSIO_DATA` names, else from
-`../shared/data`; [recordings](#recordings) lists where each file is published, and the hash of its content. A set whose
-files are missing is left out with one line; a file with another content is refused.
+`../shared/data`; [recordings](#recordings) lists where each file is published, how it is converted, and the hash of its
+content. A set whose files are missing is left out with one line; a file with another content is refused.
 
     torsio reproduce board --rows studies/board_rows.csv
 
-writes the rows of a run, from which the program is built again; sets that were left out keep their rows.
+writes the rows of a run to the file from which the rows of the program are built; sets that were left out keep theirs.
 
 ## Join
 
@@ -37,34 +37,37 @@ writes the rows of a run, from which the program is built again; sets that were 
        torsio reproduce board --set emps --template test.csv --training train.csv
 
    A line is a sample of a recording: `set`, `recording`, `sample` (from 0), `t_s`, whether it is scored (`scored_1`) or
-   trained on (`train_1`), the inputs, and the target where a model may use it. Any program can train on these
-   files; the original files may be used as well.
+   trained on (`train_1`), the inputs, and the target where a model may use it: at the start, and in the training blocks
+   of a recording that has both kinds. Any program can train on these files; the original files may be used as well.
 2. Predict every sample with `scored_1` = 1 and write a CSV file with a header and one line for each of them:
 
        set,recording,sample,prediction_m
-       emps,emps_val,20,0.000012
-       emps,emps_val,21,0.000013
+       emps,emps_val,20,0.000303
+       emps,emps_val,21,0.000331
 
    The name of the last column ends in the unit of the set: `prediction_m`, `prediction_Nm` or `prediction_rad`. `t_s`
-   may take the place of `sample`. The order of lines and columns is free, further columns and lines that begin with `#`
-   are ignored, and so are predictions of samples that are not scored, which may also be left empty. A file is for one
-   set and may be gzipped.
+   may take the place of `sample`; where both are there, they have to agree. The order of lines and columns is free,
+   further columns and lines that begin with `#` are ignored, and so are predictions of samples that are not scored, which
+   may also be left empty. Fields are separated by commas, a point is the decimal separator, quotes around a field are
+   removed, and the encoding is UTF-8. A file is for one set and may be gzipped.
 3. Score it:
 
        torsio reproduce board --predictions mine.csv --name "my model"
 
-   This prints the table of the set with the new row. It is computed by the code that scores the families of torsio. A
-   missing column, another unit, an unknown set or recording, a scored sample that is missing, occurs twice or
-   has no finite prediction are errors that name the line.
+   This prints the table of the set with the new row, *your predictions*. It is computed by the code that scores the
+   families of torsio. A column that is missing or there twice, another unit, an unknown set or recording, and a scored
+   sample that occurs twice or has no finite prediction are errors that name the line; of scored samples that are missing
+   the number and the first one are stated. An error larger than that of predicting the mean is remarked.
 4. To stay on this page, add the line that the call prints to `studies/board_rows.csv`, with the address of a
-   description or of the program in its last field. Build the program again, sort the rows and write the page with
+   description or of the program in its last field; its origin there is *joined*. Build the program again, so that it
+   contains the row, sort the rows and write the page with
 
        torsio reproduce board --recorded --rows studies/board_rows.csv --page docs/board.md
 
    and open a pull request with the file of predictions attached.
 
-Rules: a prediction may use the inputs of its recording up to its sample, the target where the template states it, and
-the training part of the split. Settings are chosen within the training part. In `xl330_gain` all recordings are
+Rules: a prediction may use the inputs of its recording up to its sample, the target of earlier samples where the template
+states it, and a model that was trained on the training part of the split. Settings are chosen within the training part. In `xl330_gain` all recordings are
 test recordings: the model of each is trained on those of the other three gains. Its measured speed and duty follow from
 the angle, so that they are not inputs and not in the template.
 
@@ -75,7 +78,7 @@ The error is in the unit of the set, over all scored samples together (RMSE) or 
 *published* (printed by others), *measured here* (a family of torsio, run by the command above) or *joined* (predictions
 of others, scored here). Measured and joined rows have the same condition, unless the row states another: the split of the
 set, free run, the same scored samples. A remark states where a family has no estimate because its filters or its window
-had not settled; one that has none at more than a tenth of the samples has no error. In
+had not settled; a family without an estimate at more than a tenth of the samples has no error. In
 [benchmarks](results/benchmarks.md) 50 samples start a model of `emps`, here 20, as the benchmark prescribes. Of a
 published figure it is stated:
 
@@ -136,6 +139,11 @@ std::string recordings_text() {
       "\n## Recordings\n\nThe hash is the SHA-256 of the unpacked content (`zcat FILE | "
       "sha256sum`), so that it does not depend on the program that packed the file. Recordings "
       "whose licence does not permit a copy are fetched by everyone from the address.\n\n"
+      "    tools/board_files ORIGINALS FOLDER\n\n"
+      "converts the files that it finds below ORIGINALS, for example clones of those repositories "
+      "at "
+      "those commits, to FOLDER, the value of `TORSIO_DATA`, and compares the hashes. HDF5 and MAT "
+      "need Debian's `python3-h5py` and `python3-scipy`.\n\n"
       "| folder | what | published at | licence | may be redistributed | files |\n"
       "|---|---|---|---|---|---|\n";
   for (const BoardSource& source : board_sources())

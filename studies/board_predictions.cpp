@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -17,34 +18,50 @@ constexpr std::string_view kAdvice =
     "torsio reproduce board --set SET --template FILE.csv writes the samples to be predicted; "
     "docs/board.md describes the file.";
 
+/// Without spaces and a pair of quotes at its ends: R writes text, and names of columns, in quotes.
+std::string_view plain_field(std::string_view field) {
+  while (!field.empty() && field.front() == ' ') field.remove_prefix(1);
+  while (!field.empty() && field.back() == ' ') field.remove_suffix(1);
+  const bool has_quotes = field.size() >= 2 && field.front() == '"' && field.back() == '"';
+  return has_quotes ? field.substr(1, field.size() - 2) : field;
+}
+
 std::vector<std::string_view> fields_of(std::string_view line) {
   std::vector<std::string_view> fields;
   while (true) {
     const std::size_t comma = line.find(',');
-    std::string_view field = line.substr(0, comma);
-    while (!field.empty() && field.front() == ' ') field.remove_prefix(1);
-    while (!field.empty() && field.back() == ' ') field.remove_suffix(1);
-    fields.push_back(field);
+    fields.push_back(plain_field(line.substr(0, comma)));
     if (comma == std::string_view::npos) return fields;
     line.remove_prefix(comma + 1);
   }
 }
 
-/// The next line without its end; `text` becomes what follows.
+/// The next line without its end, which is LF, CR LF or CR; `text` becomes what follows.
 std::string_view next_line(std::string_view& text) {
-  const std::size_t end = text.find('\n');
-  std::string_view line = text.substr(0, end);
-  text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
-  if (line.ends_with('\r')) line.remove_suffix(1);
+  const std::size_t end = text.find_first_of("\r\n");
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(std::min(end, text.size()));
+  text.remove_prefix(text.starts_with("\r\n") ? 2 : text.empty() ? 0 : 1);
   return line;
 }
 
 template <class Number>
 std::optional<Number> parsed(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
   Number value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+/// A number of samples, which may have been written as a real number: 20.0.
+template <>
+std::optional<std::size_t> parsed<std::size_t>(std::string_view text) {
+  constexpr double kLargest = 1e15;
+  const std::optional<double> value = parsed<double>(text);
+  if (!value || !(*value >= 0.0 && *value <= kLargest) || *value != std::floor(*value))
+    return std::nullopt;
+  return static_cast<std::size_t>(*value);
 }
 
 /// Where the columns of a file are.
@@ -64,6 +81,13 @@ class PredictionReader {
   }
 
   [[nodiscard]] PredictionFile read() {
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
+    if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF"))
+      throw Error({.place = result_.file,
+                   .problem = "the file is encoded in UTF-16",
+                   .expected = "UTF-8",
+                   .advice = std::string(kAdvice)});
     std::size_t number = 0;
     while (!text_.empty()) {
       ++number;
@@ -94,12 +118,12 @@ class PredictionReader {
 
   [[nodiscard]] std::size_t required(std::string_view column, std::size_t line) const {
     if (const auto found = find(column)) return *found;
-    if (header_.size() == 1 && header_.front().find(';') != std::string::npos)
-      throw Error({.place = place(line),
-                   .problem = "the fields are separated by semicolons",
-                   .expected = "commas, and a point as decimal separator",
-                   .found = header_.front(),
-                   .advice = std::string(kAdvice)});
+    for (const auto& [sign, separators] : {std::pair{';', "semicolons"}, {'\t', "tabs"}})
+      if (header_.size() == 1 && header_.front().find(sign) != std::string::npos)
+        throw Error({.place = place(line),
+                     .problem = fmt::format("the fields are separated by {}", separators),
+                     .expected = "commas, and a point as decimal separator",
+                     .advice = std::string(kAdvice)});
     throw Error({.place = place(line),
                  .problem = fmt::format("the column {} is missing", column),
                  .expected = "set, recording, sample (or t_s), prediction_UNIT",
@@ -115,9 +139,22 @@ class PredictionReader {
     columns_.time = find("t_s");
     if (!columns_.sample && !columns_.time) static_cast<void>(required("sample", number));
     constexpr std::string_view kPrediction = "prediction_";
-    const auto found = std::ranges::find_if(
-        header_, [&](const std::string& column) { return column.starts_with(kPrediction); });
+    const auto is_prediction = [&](const std::string& column) {
+      return column.starts_with(kPrediction);
+    };
+    const auto found = std::ranges::find_if(header_, is_prediction);
     if (found == header_.end()) static_cast<void>(required("prediction_UNIT", number));
+    const bool is_ambiguous = std::ranges::count_if(header_, is_prediction) > 1 ||
+                              std::ranges::any_of(std::array{"set", "recording", "sample", "t_s"},
+                                                  [&](const char* column) {
+                                                    return std::ranges::count(header_, column) > 1;
+                                                  });
+    if (is_ambiguous)
+      throw Error({.place = place(number),
+                   .problem = "a column is there twice",
+                   .expected = "set, recording, sample (or t_s) and prediction_UNIT once each",
+                   .found = fmt::format("{}", fmt::join(header_, ", ")),
+                   .advice = "Write one file for each model."});
     columns_.prediction = static_cast<std::size_t>(found - header_.begin());
     columns_.unit = found->substr(kPrediction.size());
     header_line_ = number;
@@ -164,7 +201,7 @@ class PredictionReader {
     if (columns_.sample)
       sample.sample = number_in<std::size_t>(fields[*columns_.sample], "sample",
                                              "a whole number from 0", number);
-    else
+    if (columns_.time && !(columns_.sample && fields[*columns_.time].empty()))
       sample.t_s = number_in<double>(fields[*columns_.time], "t_s", "a number", number);
     // Empty where there is no prediction: required of scored samples alone.
     const std::string_view prediction = fields[columns_.prediction];
@@ -194,6 +231,19 @@ std::size_t sample_at(const PredictionFile& file, const PredictedSample& predict
                                        1.0 / recording.sample_rate_Hz()),
                .found = fmt::format("{}", predicted.t_s),
                .advice = std::string(kAdvice)});
+}
+
+/// Its sample, which its time, where both are given, must not contradict.
+std::size_t sample_of(const PredictionFile& file, const PredictedSample& predicted,
+                      const Recording& recording) {
+  if (std::isnan(predicted.t_s)) return *predicted.sample;
+  const std::size_t at_time = sample_at(file, predicted, recording);
+  if (!predicted.sample || *predicted.sample == at_time) return at_time;
+  throw Error({.place = fmt::format("{}: line {}", file.file, predicted.line),
+               .problem = "sample and t_s contradict each other",
+               .expected = fmt::format("sample {} at {} s", at_time, predicted.t_s),
+               .found = fmt::format("sample {}", *predicted.sample),
+               .advice = "Leave one of the two columns out."});
 }
 
 const Recording& recording_of(const PredictionFile& file, const PredictedSample& predicted,
@@ -256,8 +306,7 @@ std::vector<std::vector<double>> matched_predictions(const PredictionFile& file,
   }
   for (const PredictedSample& predicted : file.samples) {
     const Recording& recording = recording_of(file, predicted, dataset, targets);
-    const std::size_t sample =
-        predicted.sample ? *predicted.sample : sample_at(file, predicted, recording);
+    const std::size_t sample = sample_of(file, predicted, recording);
     if (sample >= recording.size())
       throw Error({.place = fmt::format("{}: line {}", file.file, predicted.line),
                    .problem = fmt::format("{} has no sample {}", predicted.recording, sample),

@@ -113,7 +113,8 @@ std::string board_rows_csv(std::span<const BoardRow> rows) {
 void require_board_name(const std::string& name, const std::string& place) {
   constexpr std::size_t kLongest = 60;
   const bool has_sign = name.find_first_of(",\"\\|\n\r\t") != std::string::npos;
-  if (!name.empty() && name.size() <= kLongest && !has_sign) return;
+  const bool is_blank = name.find_first_not_of(' ') == std::string::npos;
+  if (!is_blank && name.size() <= kLongest && !has_sign) return;
   throw UsageError({.place = place,
                     .expected = fmt::format("a name of 1 to {} characters without comma, quote, "
                                             "vertical line and backslash",

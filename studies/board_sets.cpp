@@ -254,11 +254,14 @@ std::string missing_file(const BoardSource& source, const std::string& folder) {
     if (!std::filesystem::exists(path)) return relative;
     const std::string sha256 = sha256_hex(unpacked_content(path));
     if (sha256 != file.sha256)
-      throw Error({.place = path,
-                   .problem = "it is not the file that the board is about",
-                   .expected = fmt::format("SHA-256 {} of its unpacked content", file.sha256),
-                   .found = sha256,
-                   .advice = fmt::format("Fetch it again from {}.", source.address)});
+      throw Error(
+          {.place = path,
+           .problem = "it is not the file that the board is about",
+           .expected = fmt::format("SHA-256 {} of its unpacked content", file.sha256),
+           .found = sha256,
+           .advice = fmt::format("Fetch it again from {}, and convert it: tools/board_files "
+                                 "ORIGINALS FOLDER.",
+                                 source.address)});
   }
   return {};
 }

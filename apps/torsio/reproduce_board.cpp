@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 #include <sstream>
 #include <string_view>
@@ -30,7 +31,8 @@ constexpr std::string_view kBoard = "board";
 
 [[noreturn]] void refuse_board(std::string_view option, std::string problem) {
   throw torsio::UsageError(
-      {.place = fmt::format("torsio reproduce board {}", option), .problem = std::move(problem)});
+      {.place = fmt::format("torsio reproduce board{}{}", option.empty() ? "" : " ", option),
+       .problem = std::move(problem)});
 }
 
 /// The rows of this program, with those of others.
@@ -61,6 +63,43 @@ void require_its_rows(const std::string& file, const std::vector<torsio::BoardRo
                            .advice =
                                "Build the program again: it reads studies/board_rows.csv when it "
                                "is built. Or write to another file."});
+}
+
+/// Removes the row of an earlier prediction of that name; that of a family or a publication is refused.
+void give_way(std::vector<torsio::BoardRow>& rows, const torsio::BoardSet& set,
+              const std::string& name) {
+  const auto same = std::ranges::find_if(
+      rows, [&](const torsio::BoardRow& row) { return row.set == set.name && row.model == name; });
+  if (same == rows.end()) return;
+  if (same->origin != torsio::BoardOrigin::joined)
+    throw torsio::UsageError(
+        {.place = "torsio reproduce board --name",
+         .problem = fmt::format("the set {} has a row of this name, which is {}", set.name,
+                                torsio::name(same->origin)),
+         .found = name,
+         .advice = "Choose a name that states what is different."});
+  rows.erase(same);
+}
+
+/// What a wrong unit or sign looks like, else nothing.
+std::string remark_on(const torsio::BoardSet& set, const std::vector<torsio::BoardTarget>& targets,
+                      double error) {
+  double sum = 0.0;
+  std::size_t samples = 0;
+  for (const torsio::BoardTarget& target : targets) {
+    sum = std::accumulate(target.values.begin(), target.values.end(), sum);
+    samples += target.values.size();
+  }
+  std::vector<std::vector<double>> constant;
+  constant.reserve(targets.size());
+  for (const torsio::BoardTarget& target : targets)
+    constant.emplace_back(target.values.size(), sum / static_cast<double>(samples));
+  const double of_mean = torsio::board_score(set, targets, constant).error;
+  if (error <= of_mean) return {};
+  return fmt::format(
+      "The error is larger than {:.4g} {}, that of predicting the mean of the target: are unit and "
+      "sign right?\n",
+      of_mean, set.unit);
 }
 
 nlohmann::ordered_json board_json(const torsio::BoardSet& set,
@@ -108,21 +147,25 @@ void score_predictions(const BoardFlags& flags, const JsonOutput& json) {
   torsio::require_board_name(flags.name, "torsio reproduce board --name");
   const torsio::PredictionFile file = torsio::read_predictions(flags.predictions);
   const torsio::BoardSet& set = *file.set;
+  std::vector<torsio::BoardRow> rows = known_rows();
+  give_way(rows, set, flags.name);
   ProgressBar progress;
   const torsio::ComparisonCase data = torsio::board_case(set, progress.listener());
   const std::vector<torsio::BoardTarget> targets = torsio::board_targets(set, data.dataset);
   const torsio::BoardScore score =
       torsio::board_score(set, targets, torsio::matched_predictions(file, data.dataset, targets));
+  if (!std::isfinite(score.error))
+    throw torsio::Error({.place = flags.predictions,
+                         .problem = "the error is not finite: a prediction is too large"});
   const torsio::BoardRow row =
       torsio::measured_row(set.name, flags.name, torsio::BoardOrigin::added, score.error);
-  std::vector<torsio::BoardRow> rows = known_rows();
   rows.push_back(row);
   show_sets({&set}, rows, json);
   if (json.wants_tables())
-    print(
-        fmt::format("{} samples were scored. The line for studies/board_rows.csv, without the "
-                    "address of a description:\n{}\n",
-                    score.samples, torsio::board_row_csv(row)));
+    print(fmt::format(
+        "{}{} samples were scored. The line for studies/board_rows.csv, without the "
+        "address of a description:\n{}\n",
+        remark_on(set, targets, score.error), score.samples, torsio::board_row_csv(row)));
 }
 
 void show_recorded(const BoardFlags& flags, const std::string& page, const JsonOutput& json) {
@@ -207,8 +250,8 @@ void reproduce_board(const BoardFlags& flags, const std::vector<std::string>& it
                    (flags.is_recorded || !flags.rows.empty() ? 1 : 0);
   if (jobs > 1)
     refuse_board("",
-                 "--template or --training, --predictions, and --recorded or --rows exclude each "
-                 "other");
+                 "these exclude each other: --predictions; --template with --training; --recorded "
+                 "with --rows");
   if (writes_samples == flags.set.empty())
     refuse_board("--set", "it belongs to --template or --training, and they need it");
   if (flags.predictions.empty() != flags.name.empty())

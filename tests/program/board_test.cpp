@@ -55,6 +55,10 @@ TEST_F(BoardCalls, WithOptionsThatDoNotBelongTogetherAreRefused) {
   refused("board --set empz --template a.csv", "no set \"empz\"");
   refused("board --predictions a.csv --name mine --rows r.csv", "exclude each other");
   refused("board --predictions a.csv --name a,b", "without comma");
+  std::ofstream(folder_.path("mine.csv"))
+      << "set,recording,sample,prediction_m\nemps,emps_val,20,0\n";
+  refused("board --predictions mine.csv --name dynoNet",
+          "the set emps has a row of this name, which is published");
   refused("board --predictions a.csv --name mine --page p.md", "--recorded");
   refused("board --quick --page p.md", "a page needs the full run");
   refused("board --recorded --report p.html", "they show the run of an experiment");

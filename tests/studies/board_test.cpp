@@ -108,10 +108,13 @@ TEST(BoardSets, HaveSourcesAndFilesWithHashes) {
 TEST(BoardSources, AreLeftOutWithTheAddressOfWhatIsMissing) {
   const TemporaryFolder folder;
   const BoardSource& source = source_of(find_board_set("emps", "test"));
-  EXPECT_THAT(left_out(source, folder.path("")),
-              AllOf(HasSubstr("emps/emps_est.csv.gz is missing"), HasSubstr("helonayala/narmax"),
-                    HasSubstr("/emps (TORSIO_DATA is")));
-  EXPECT_THAT(left_out(source, ""), HasSubstr("$TORSIO_DATA/emps (TORSIO_DATA is not set)"));
+  EXPECT_THAT(
+      left_out(source, folder.path("")),
+      AllOf(HasSubstr("emps/emps_est.csv.gz is missing"), HasSubstr("helonayala/narmax"),
+            HasSubstr("/emps with  tools/board_files ORIGINALS "), HasSubstr("(TORSIO_DATA is")));
+  EXPECT_THAT(left_out(source, ""),
+              HasSubstr("$TORSIO_DATA/emps with  tools/board_files ORIGINALS $TORSIO_DATA  "
+                        "(TORSIO_DATA is not set)"));
 }
 
 /// The message of the error that a call throws.
@@ -134,7 +137,8 @@ TEST(BoardSources, RefuseAFileWithAnotherContent) {
   EXPECT_THAT(message_of([&] { static_cast<void>(left_out(source, folder.path(""))); }),
               AllOf(HasSubstr("emps_est.csv.gz"), HasSubstr("expected SHA-256 45c38edf079b"),
                     HasSubstr("found " + sha256_hex("t_s,vir_V,qm_m\n0,0,0\n")),
-                    HasSubstr("Fetch it again from https://github.com/helonayala/narmax")));
+                    HasSubstr("Fetch it again from https://github.com/helonayala/narmax"),
+                    HasSubstr("tools/board_files ORIGINALS FOLDER")));
 }
 
 /// A test recording of 30 samples at 1 kHz, of which the set scores 10.
@@ -209,6 +213,40 @@ TEST_F(BoardPredictions, MayBeGivenByTime) {
   EXPECT_THAT(refusal("set,recording,t_s,prediction_m\nemps,emps_val,0.0205,1\n"),
               AllOf(HasSubstr("mine.csv: line 2, column t_s"), HasSubstr("no sample of emps_val"),
                     HasSubstr("found 0.0205")));
+}
+
+TEST_F(BoardPredictions, MayBeWrittenByAnySpreadsheetOrLanguage) {
+  const std::string plain = file_of(0.25);
+  EXPECT_NEAR(score("\xEF\xBB\xBF" + plain).error, 0.25, 1e-12);
+  std::string old_ends = plain;
+  std::ranges::replace(old_ends, '\n', '\r');
+  EXPECT_NEAR(score(old_ends).error, 0.25, 1e-12);
+  // R quotes text and names of columns; a table of real numbers has real sample numbers.
+  std::string quoted = "\"set\",\"recording\",\"sample\",\"prediction_m\"\n";
+  for (std::size_t n = 20; n < 30; ++n)
+    quoted += "\"emps\",\"emps_val\"," + std::to_string(n) + ".0,+" +
+              std::to_string(0.5 * static_cast<double>(n) + 0.25) + "\n";
+  EXPECT_NEAR(score(quoted).error, 0.25, 1e-12);
+  EXPECT_THAT(refusal("\xFF\xFEs"), HasSubstr("encoded in UTF-16"));
+  EXPECT_THAT(refusal("set\trecording\tsample\tprediction_m\nemps\temps_val\t20\t1\n"),
+              HasSubstr("line 1: the fields are separated by tabs"));
+  EXPECT_THAT(refusal("set,recording,sample,prediction_m\nemps,emps_val,20.5,1\n"),
+              HasSubstr("a whole number"));
+}
+
+TEST_F(BoardPredictions, HaveNoColumnThatContradictsAnother) {
+  EXPECT_THAT(refusal("set,recording,sample,prediction_m,prediction_m\nemps,emps_val,20,1,2\n"),
+              AllOf(HasSubstr("line 1: a column is there twice"), HasSubstr("one file for each")));
+  EXPECT_THAT(refusal("set,recording,sample,sample,prediction_m\nemps,emps_val,20,21,2\n"),
+              HasSubstr("a column is there twice"));
+  EXPECT_THAT(refusal("set,recording,sample,t_s,prediction_m\nemps,emps_val,20,0.021,2\n"),
+              AllOf(HasSubstr("line 2: sample and t_s contradict each other"),
+                    HasSubstr("sample 21 at 0.021 s"), HasSubstr("found sample 20")));
+  std::string both = "set,recording,sample,t_s,prediction_m\n";
+  for (std::size_t n = 20; n < 30; ++n)
+    both += "emps,emps_val," + std::to_string(n) + ",0.0" + std::to_string(n) + "," +
+            std::to_string(0.5 * static_cast<double>(n)) + "\n";
+  EXPECT_NEAR(score(both).error, 0.0, 1e-12);
 }
 
 TEST_F(BoardPredictions, MayBeLeftEmptyWhereNothingIsScored) {
@@ -302,7 +340,7 @@ TEST(BoardSamples, OfBlocksHaveTheTargetsOfTheTraining) {
 
 TEST(BoardNames, HaveNoSignThatSeparatesFields) {
   EXPECT_NO_THROW(require_board_name("my network (64 units)", "--name"));
-  for (const char* name : {"", "a,b", "a|b", "a\"b", "a\nb"})
+  for (const char* name : {"", "  ", "a,b", "a|b", "a\"b", "a\nb"})
     EXPECT_THROW(require_board_name(name, "--name"), UsageError) << name;
   EXPECT_EQ(board_model_name("lstm, 32 cells"), "lstm; 32 cells");
 }

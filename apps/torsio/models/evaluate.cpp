@@ -56,7 +56,7 @@ torsio::Recording prediction_recording(const torsio::ScoredRun& run) {
   return result;
 }
 
-/// Of which part of the error bars the shares are without, where the sensor is that of the training.
+/// The part of the error bars without which the shares are counted, where the sensor is that of the training.
 std::string common_error_text(const std::vector<torsio::ScoredRun>& runs,
                               const std::string& target) {
   const auto run = std::ranges::find_if(
