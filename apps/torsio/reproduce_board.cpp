@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <set>
 #include <sstream>
 #include <string_view>
@@ -17,6 +16,7 @@
 
 #include "common/data_flags.hpp"
 #include "common/progress_bar.hpp"
+#include "core/running_mean.hpp"
 #include "studies/board_data.hpp"
 #include "studies/board_predictions.hpp"
 #include "studies/board_rows.hpp"
@@ -84,16 +84,13 @@ void give_way(std::vector<torsio::BoardRow>& rows, const torsio::BoardSet& set,
 /// What a wrong unit or sign looks like, else nothing.
 std::string remark_on(const torsio::BoardSet& set, const std::vector<torsio::BoardTarget>& targets,
                       double error) {
-  double sum = 0.0;
-  std::size_t samples = 0;
-  for (const torsio::BoardTarget& target : targets) {
-    sum = std::accumulate(target.values.begin(), target.values.end(), sum);
-    samples += target.values.size();
-  }
+  torsio::RunningMean mean;
+  for (const torsio::BoardTarget& target : targets)
+    for (const double value : target.values) mean.add(value);
   std::vector<std::vector<double>> constant;
   constant.reserve(targets.size());
   for (const torsio::BoardTarget& target : targets)
-    constant.emplace_back(target.values.size(), sum / static_cast<double>(samples));
+    constant.emplace_back(target.values.size(), mean.mean());
   const double of_mean = torsio::board_score(set, targets, constant).error;
   if (error <= of_mean) return {};
   return fmt::format(
