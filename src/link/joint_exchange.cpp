@@ -22,8 +22,7 @@ std::string_view refusal_advice(LinkRefusal reason) noexcept {
     case LinkRefusal::only_when_disabled: return "Disable the joint first.";
     case LinkRefusal::not_in_this_state:
       return "`torsio connect describe` shows the state: a stop ends by disable at rest, a fault "
-             "by a "
-             "reset.";
+             "by a reset at rest when its cause has ended.";
     case LinkRefusal::too_many_subscribers: return "End another program that watches this joint.";
     case LinkRefusal::line_too_slow: return "Ask for fewer channels or a lower rate.";
     case LinkRefusal::repeated:

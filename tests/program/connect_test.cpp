@@ -205,9 +205,10 @@ TEST_F(Connect, IsCompletedInAShell) {
 class ConnectToDaemon : public Program {
  protected:
   /// Runs shell commands while a joint is served on the socket `joint`; in them T is the program.
-  Outcome with_joint(const std::string& commands) {
+  Outcome with_joint(const std::string& commands, const std::string& options = "") {
     const std::string start =
-        "; $T joint dfki-50 --watchdog 1s --unix joint >joint.txt 2>&1 & DAEMON=$!; "
+        "; $T joint dfki-50 --watchdog 1s --unix joint " + options +
+        " >joint.txt 2>&1 & DAEMON=$!; "
         "trap \"kill $DAEMON\" EXIT; until [ -S joint ]; do sleep 0.05; done; "
         "until $T connect describe --unix joint --json - | grep -q '\"ready\"'; do sleep 0.05; "
         "done; ";
@@ -241,6 +242,20 @@ TEST_F(ConnectToDaemon, AJointWhoseHostIsKilledStops) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err << contents("joint.txt");
   EXPECT_EQ(document("described.json")["state"], "stop");
   EXPECT_THAT(contents("joint.txt"), HasSubstr("host_lost"));
+}
+
+// With a frozen angle the joint seems to be moved by a torque that nothing measures. It comes to rest while the reset waits.
+TEST_F(ConnectToDaemon, AFaultInAMotionIsNamedAndTheResetThatIsAdvisedEndsIt) {
+  folder_.file("move.csv", "t_s,velocity_rad_s\n0,0\n1,1\n2,1\n3,1\n4,1\n5,1\n6,1\n");
+  const Outcome outcome = with_joint(
+      "$T connect play move.csv --valid 1s --unix joint; "
+      "$T connect reset --unix joint --json reset.json",
+      "--fault 1:joint_angle=freeze@2s");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err << contents("joint.txt");
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("the joint ended the motion"),
+                                 HasSubstr("its stop_cause is overload"),
+                                 HasSubstr("`torsio connect reset` makes it ready again")));
+  EXPECT_EQ(document("reset.json")["state"], "ready");
 }
 
 TEST_F(ConnectToDaemon, ThroughAHostileProxyItMovesOrStops) {

@@ -1,4 +1,6 @@
 // The commands of docs/link_tour.md: from a joint on a bench, over its link, to torque control with a model of its spring.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -18,7 +20,7 @@ using Json = nlohmann::json;
 constexpr const char* kTour = R"sh(
 L="--port 38001 --host-port 38000"
 I="spring_deflection_rad, lowpass(rate(spring_deflection_rad), 10Hz), lowpass(rate(joint_angle_rad), 10Hz)"
-$T joint dfki-50#03 $L --watchdog 2s --vertical-axis --link-mass 1000kg --link-length 1m >joint.txt 2>&1 &
+$T joint dfki-50#03 $L --watchdog 2s --vertical-axis --link-mass 300kg --link-length 1m >joint.txt 2>&1 &
 JOINT=$!
 trap "kill $JOINT" EXIT
 ready() {
@@ -51,15 +53,22 @@ record train train.csv && record test test.csv &&
 
 class LinkTours : public Program {
  protected:
-  /// References of the torque: two sines that begin and end at 0.
-  void write_motion(const std::string& name, double duration_s, double size, double phase_rad) {
+  /// References of the torque: two sines that begin and end at 0, in parts of opposite signs, so that the link, which nothing
+  /// else brakes, moves equally fast in both directions.
+  void write_motion(const std::string& name, int parts, double part_s, double size,
+                    double phase_rad) {
+    constexpr int kRate_Hz = 100;
+    const int part_samples = static_cast<int>(std::lround(part_s * kRate_Hz));
     std::string text = "t_s,torque_Nm\n";
-    for (double t_s = 0.0; t_s <= duration_s; t_s += 0.01) {
-      const double fade = std::min({1.0, t_s / 2.0, (duration_s - t_s) / 2.0});
+    for (int n = 0; n <= parts * part_samples; ++n) {
+      const double t_s = static_cast<double>(n % part_samples) / kRate_Hz;
+      const double sign = n / part_samples % 2 == 0 ? 1.0 : -1.0;
+      const double fade = std::min({1.0, t_s / 2.0, (part_s - t_s) / 2.0});
       const double turn = 2.0 * std::numbers::pi * t_s;
       const double torque_Nm =
-          fade * size * (28.0 * std::sin(0.25 * turn + phase_rad) + 14.0 * std::sin(0.66 * turn));
-      text += std::to_string(t_s) + "," + std::to_string(torque_Nm) + "\n";
+          28.0 * std::sin(0.25 * turn + phase_rad) + 14.0 * std::sin(0.66 * turn);
+      text +=
+          fmt::format("{},{}\n", static_cast<double>(n) / kRate_Hz, sign * fade * size * torque_Nm);
     }
     folder_.file(name, text);
   }
@@ -104,8 +113,8 @@ class LinkTours : public Program {
 };
 
 TEST_F(LinkTours, FromTheBenchToTorqueControlWithItsModel) {
-  write_motion("train_move.csv", 20.0, 1.0, 0.0);
-  write_motion("test_move.csv", 8.0, 0.8, 0.4);
+  write_motion("train_move.csv", 2, 10.0, 1.0, 0.0);
+  write_motion("test_move.csv", 1, 8.0, 0.8, 0.4);
   // The output is as good as blocked by the inertia of the link. A recording in which a busy machine has left out more than can be
   // bridged, or so much that the joint ended the motion, is made again.
   const Outcome outcome = shell("T=" + std::string(TORSIO_PROGRAM) + kTour);

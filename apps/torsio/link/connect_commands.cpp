@@ -24,6 +24,8 @@ namespace {
 using torsio::JointConnection;
 
 constexpr std::size_t kLargestModel_B = 64 << 20;
+constexpr std::chrono::seconds kLongestRest(3);
+constexpr std::chrono::milliseconds kBetweenResets(50);
 
 struct CommandFlags : ConnectFlags {
   unsigned category = 1;
@@ -67,6 +69,20 @@ void upload(const CommandFlags& flags, JointConnection& connection) {
                     });
 }
 
+/// A joint that has found a fault comes to rest first, and refuses until then.
+void reset_when_at_rest(JointConnection& connection) {
+  const auto end = std::chrono::steady_clock::now() + kLongestRest;
+  for (;;) {
+    try {
+      return connection.reset_fault();
+    } catch (const torsio::Error&) {
+      if (std::chrono::steady_clock::now() > end) throw;
+      if (connection.information().state != torsio::LinkDriveState::fault) throw;
+    }
+    std::this_thread::sleep_for(kBetweenResets);
+  }
+}
+
 void add_state_verbs(CLI::App& connect) {
   auto stop = std::make_shared<CommandFlags>();
   CLI::App* verb = add_command(connect, "stop", "stop a joint, also one that another host controls",
@@ -86,8 +102,8 @@ void add_state_verbs(CLI::App& connect) {
                    [](const CommandFlags&, JointConnection& connection) { connection.disable(); }));
   auto reset = std::make_shared<CommandFlags>();
   reset->add(*add_command(
-      connect, "reset", "end a fault whose cause has ended", "reset --joint 3", reset,
-      [](const CommandFlags&, JointConnection& connection) { connection.reset_fault(); }));
+      connect, "reset", "end a fault as soon as its cause has ended", "reset --joint 3", reset,
+      [](const CommandFlags&, JointConnection& connection) { reset_when_at_rest(connection); }));
 }
 
 void add_data_verbs(CLI::App& connect) {

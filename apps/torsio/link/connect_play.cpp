@@ -132,13 +132,28 @@ struct Played {
   std::uint64_t missed = 0;  ///< periods of this program that began more than one period late
 };
 
-[[noreturn]] void refuse_state(const JointConnection& joint, double t_s) {
+/// What the joint found, if it has the register for it: "; its stop_cause is overload".
+std::string stop_cause(JointConnection& joint) {
+  constexpr const char* kRegister = "stop_cause";
+  try {
+    const auto& all = joint.registers();
+    if (std::ranges::find(all, kRegister, &JointConnection::Register::name) == all.end()) return {};
+    return fmt::format("; its {} is {}", kRegister, torsio::text_of(joint.read(kRegister)));
+  } catch (const torsio::Error&) {
+    return {};  // the line, too, may have ended
+  }
+}
+
+[[noreturn]] void refuse_state(JointConnection& joint, double t_s) {
   const torsio::LinkState state = *joint.last_change();
-  throw torsio::Error({.place = joint.place(),
-                       .problem = fmt::format("the joint ended the motion after {:.3f} s", t_s),
-                       .found = fmt::format("state {}, {}: {}", name(state.state),
-                                            name(state.reason), meaning(state.reason)),
-                       .advice = "`torsio connect disable` or `reset` makes it ready again."});
+  const bool is_fault = state.state == torsio::LinkDriveState::fault;
+  throw torsio::Error(
+      {.place = joint.place(),
+       .problem = fmt::format("the joint ended the motion after {:.3f} s", t_s),
+       .found = fmt::format("state {}, {}: {}{}", name(state.state), name(state.reason),
+                            meaning(state.reason), stop_cause(joint)),
+       .advice = fmt::format("`torsio connect {}` makes it ready again.",
+                             is_fault ? "reset" : "disable")});
 }
 
 bool has_ended(const JointConnection& joint) {
