@@ -246,7 +246,7 @@ BoardRun run_board(const StudyOptions& options, const Progress& progress) {
     const BoardGroup& group = groups[g];
     const BoardSet& first = *group.sets.front();
     const Progress part = nth_of(progress, g, groups.size(), first.name);
-    std::string reason = left_out(source_of(first), folder);
+    std::string reason = why_left_out(source_of(first), folder);
     if (reason.empty() && options.is_quick && group.data == "xl330")
       reason = "not part of the quick run";
     if (!reason.empty())

@@ -126,7 +126,7 @@ std::string board_folder() {
   }
 }
 
-std::string left_out(const BoardSource& source, const std::string& folder) {
+std::string why_left_out(const BoardSource& source, const std::string& folder) {
   const std::string missing =
       folder.empty() ? fmt::format("{}/", source.folder) : missing_file(source, folder);
   if (missing.empty()) return {};
@@ -144,7 +144,7 @@ std::string left_out(const BoardSource& source, const std::string& folder) {
 }
 
 ComparisonCase board_case(const BoardSet& set, const Progress& progress) {
-  const std::string reason = left_out(source_of(set), board_folder());
+  const std::string reason = why_left_out(source_of(set), board_folder());
   if (!reason.empty())
     throw Error({.place = std::string(set.name),
                  .problem = reason,

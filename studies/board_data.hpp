@@ -30,10 +30,10 @@ struct BoardScore {
 
 /// Why the sets of a source cannot be run here, and where its files belong; empty: they can.
 /// @throws Error if a file has another content than expected.
-[[nodiscard]] std::string left_out(const BoardSource& source, const std::string& folder);
+[[nodiscard]] std::string why_left_out(const BoardSource& source, const std::string& folder);
 
 /// Training and test recordings of a set with the inputs of its models.
-/// @throws Error as `left_out`, or with its text if files are missing.
+/// @throws Error as `why_left_out`, or with its text if files are missing.
 [[nodiscard]] ComparisonCase board_case(const BoardSet& set, const Progress& progress = {});
 
 [[nodiscard]] std::vector<BoardTarget> board_targets(const BoardSet& set, const Dataset& dataset);

@@ -128,16 +128,28 @@ void show_sets(const std::vector<const torsio::BoardSet*>& sets,
   json.write(document.dump(2) + "\n");
 }
 
+/// A file of `board_samples`, whose lines after the header are the samples.
+void write_samples(const std::string& path, const std::string& csv, const std::string& use) {
+  write_text(path, csv);
+  remark(fmt::format("{}: {} samples{}", path, std::ranges::count(csv, '\n') - 1, use));
+}
+
 void write_samples(const BoardFlags& flags) {
   const torsio::BoardSet& set = torsio::find_board_set(flags.set, "torsio reproduce board --set");
   ProgressBar progress;
   const torsio::ComparisonCase data = torsio::board_case(set, progress.listener());
-  if (!flags.test_samples.empty())
-    write_text(flags.test_samples,
-               torsio::board_samples(set, data.dataset, torsio::BoardPart::test));
+  if (!flags.test_samples.empty()) {
+    std::size_t scored = 0;
+    for (const torsio::BoardTarget& target : torsio::board_targets(set, data.dataset))
+      scored += target.samples.size();
+    write_samples(flags.test_samples,
+                  torsio::board_samples(set, data.dataset, torsio::BoardPart::test),
+                  fmt::format(", {} of them to be predicted", scored));
+  }
   if (!flags.training_samples.empty())
-    write_text(flags.training_samples,
-               torsio::board_samples(set, data.dataset, torsio::BoardPart::training));
+    write_samples(flags.training_samples,
+                  torsio::board_samples(set, data.dataset, torsio::BoardPart::training),
+                  ", for training");
 }
 
 void score_predictions(const BoardFlags& flags, const JsonOutput& json) {
