@@ -48,6 +48,26 @@ TEST_F(MainJob, GoesFromARecordingToADeployedModel) {
             "t_s,torque_Nm,torque_fresh_1,estimated_torque_Nm,torque_std_dev_Nm,fault_1");
 }
 
+TEST_F(MainJob, StatesWhichErrorOfTheReferenceSensorTheSharesAreWithout) {
+  record();
+  const auto write_mapping = [&](const std::string& name, const std::string& zero) {
+    (void)folder_.file(name, "uncertainty: {torque_Nm: {zero: " + zero + "}}\n");
+  };
+  write_mapping("bench.yaml", "0.2Nm");
+  write_mapping("other.yaml", "0.3Nm");
+  ASSERT_EQ(torsio("fit a.csv --mapping bench.yaml --model linear -o m.safetensors").exit_code, 0);
+  const std::string other = "b states 0.3 Nm ";
+  const std::string same = torsio("evaluate m.safetensors b.csv --mapping bench.yaml").out;
+  EXPECT_NE(same.find("without 0.2 Nm "), std::string::npos) << same;
+  EXPECT_EQ(same.find("of its sensor"), std::string::npos) << same;
+  const std::string differs = torsio("evaluate m.safetensors b.csv --mapping other.yaml").out;
+  EXPECT_NE(differs.find(other), std::string::npos) << differs;
+  EXPECT_NE(differs.find("the training 0.2 Nm "), std::string::npos) << differs;
+  ASSERT_EQ(torsio("fit a.csv --model linear -o none.safetensors").exit_code, 0);
+  const std::string none = torsio("evaluate none.safetensors b.csv --mapping other.yaml").out;
+  EXPECT_NE(none.find("of its sensor, the training none"), std::string::npos) << none;
+}
+
 TEST_F(MainJob, StatesWhichAbsurdValuesTheFitDidNotUse) {
   record();
   shell("awk -F, -v OFS=, 'NR == 5002 { $3 = 1e12 } 1' a.csv >glitch.csv");

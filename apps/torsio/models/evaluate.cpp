@@ -68,6 +68,24 @@ std::string common_error_text(const std::vector<torsio::ScoredRun>& runs,
       torsio::uncertainty_text(run->common, target));
 }
 
+/// Recordings that state another error of the sensor than the training: the table counts them as of the same sensor.
+std::string other_sensor_text(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
+  const std::string& target = dataset.target;
+  const torsio::SensorUncertainty& trained = file.settings.target_uncertainty;
+  if (dataset.load_target.is_used() || target != file.settings.target) return {};
+  for (const torsio::DatasetRecord& record : dataset.records) {
+    const auto& stated = record.recording.uncertainties;
+    const auto own = stated.find(target);
+    if (own == stated.end() || own->second == trained) continue;
+    return fmt::format(
+        "{} states {} of its sensor, the training {}.\nThe shares are those of one sensor; of two "
+        "sensors the errors add up, and the shares are lower than they should be.\n",
+        record.recording.name(), torsio::uncertainty_text(own->second, target),
+        trained.is_stated() ? torsio::uncertainty_text(trained, target) : "none");
+  }
+  return {};
+}
+
 /// Without recordings they would be ignored.
 void require_no_flags_of_recordings(const EvaluateFlags& flags) {
   for (const auto& [flag, value] : {std::pair{"--predictions", flags.predictions},
@@ -126,7 +144,8 @@ void run(EvaluateFlags& flags) {
   if (!flags.predictions.empty())
     torsio::write_recording(prediction_recording(runs.front()), flags.predictions);
   if (flags.json.wants_tables())
-    print(evaluation_text(results) + common_error_text(runs, dataset.target));
+    print(evaluation_text(results) + common_error_text(runs, dataset.target) +
+          other_sensor_text(file, dataset));
   flags.json.write(torsio::results_json(results));
   if (flags.report.is_wanted())
     flags.report.write(
