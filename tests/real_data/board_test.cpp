@@ -30,7 +30,7 @@ class Board : public testing::TestWithParam<std::string> {
  protected:
   [[nodiscard]] static const BoardSet& set() { return find_board_set(GetParam(), "test"); }
   void SetUp() override {
-    const std::string reason = left_out(source_of(set()), folder_of_recordings());
+    const std::string reason = why_left_out(source_of(set()), folder_of_recordings());
     if (!reason.empty()) GTEST_SKIP() << reason;
   }
 };
@@ -81,7 +81,7 @@ TEST_P(Board, ScoresAFileThatIsWrittenFromItsTemplate) {
 // The duty of a servo's drive is its position error times the gain.
 TEST(BoardOfTheServo, HidesWhatFollowsFromTheAngle) {
   const BoardSet& set = find_board_set("xl330_gain", "test");
-  if (!left_out(source_of(set), folder_of_recordings()).empty())
+  if (!why_left_out(source_of(set), folder_of_recordings()).empty())
     GTEST_SKIP() << "set TORSIO_DATA to the folder of the recordings";
   const ComparisonCase data = board_case(set);
   const std::string test = board_samples(set, data.dataset, BoardPart::test);
@@ -113,7 +113,7 @@ INSTANTIATE_TEST_SUITE_P(OfPublicRecordings, Board, testing::ValuesIn(set_names(
 // The recorded figures are those of this code: a model whose fit takes milliseconds is fitted again.
 TEST(BoardOfEmps, HasTheErrorOfTheLinearModel) {
   const BoardSet& set = find_board_set("emps", "test");
-  if (!left_out(source_of(set), folder_of_recordings()).empty())
+  if (!why_left_out(source_of(set), folder_of_recordings()).empty())
     GTEST_SKIP() << "set TORSIO_DATA to the folder of the recordings";
   const ComparisonCase data = board_case(set);
   const auto choices = model_choices(data.dataset, "linear", data.inputs);

@@ -109,10 +109,10 @@ TEST(BoardSources, AreLeftOutWithTheAddressOfWhatIsMissing) {
   const TemporaryFolder folder;
   const BoardSource& source = source_of(find_board_set("emps", "test"));
   EXPECT_THAT(
-      left_out(source, folder.path("")),
+      why_left_out(source, folder.path("")),
       AllOf(HasSubstr("emps/emps_est.csv.gz is missing"), HasSubstr("helonayala/narmax"),
             HasSubstr("/emps with  tools/board_files ORIGINALS "), HasSubstr("(TORSIO_DATA is")));
-  EXPECT_THAT(left_out(source, ""),
+  EXPECT_THAT(why_left_out(source, ""),
               HasSubstr("$TORSIO_DATA/emps with  tools/board_files ORIGINALS $TORSIO_DATA  "
                         "(TORSIO_DATA is not set)"));
 }
@@ -134,7 +134,7 @@ TEST(BoardSources, RefuseAFileWithAnotherContent) {
   std::filesystem::create_directory(folder.path("emps"));
   std::ofstream(folder.path("emps/emps_est.csv.gz")) << "t_s,vir_V,qm_m\n0,0,0\n";
   const BoardSource& source = source_of(find_board_set("emps", "test"));
-  EXPECT_THAT(message_of([&] { static_cast<void>(left_out(source, folder.path(""))); }),
+  EXPECT_THAT(message_of([&] { static_cast<void>(why_left_out(source, folder.path(""))); }),
               AllOf(HasSubstr("emps_est.csv.gz"), HasSubstr("expected SHA-256 45c38edf079b"),
                     HasSubstr("found " + sha256_hex("t_s,vir_V,qm_m\n0,0,0\n")),
                     HasSubstr("Fetch it again from https://github.com/helonayala/narmax"),
