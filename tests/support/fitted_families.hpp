@@ -29,8 +29,14 @@ inline std::vector<std::string> spring_families() {
 /// Small values of the options that set how long a fit takes, for tests that need no better model.
 inline std::map<std::string, std::string> quick_options(std::string_view family) {
   std::map<std::string, std::string> options;
-  for (const auto& [name, value] : std::map<std::string, std::string>{
-           {"samples", "300"}, {"inducing_points", "20"}, {"rounds", "1"}}) {
+  for (const auto& [name, value] : std::map<std::string, std::string>{{"samples", "300"},
+                                                                      {"inducing_points", "20"},
+                                                                      {"rounds", "1"},
+                                                                      {"updates", "5000"},
+                                                                      {"epochs", "10"},
+                                                                      {"restarts", "0"},
+                                                                      {"starts", "2"},
+                                                                      {"iterations", "80"}}) {
     const auto known = find_family(family).options;
     if (std::ranges::find(known, name, &OptionInfo::name) != known.end()) options[name] = value;
   }
