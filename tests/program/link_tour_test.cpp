@@ -115,7 +115,7 @@ class LinkTours : public Program {
 TEST_F(LinkTours, FromTheBenchToTorqueControlWithItsModel) {
   write_motion("train_move.csv", 2, 10.0, 1.0, 0.0);
   write_motion("test_move.csv", 1, 8.0, 0.8, 0.4);
-  // The output is as good as blocked by the inertia of the link. A recording in which a busy machine has left out more than can be
+  // The link is so heavy that it moves slowly. A recording in which a busy machine has left out more than can be
   // bridged, or so much that the joint ended the motion, is made again.
   const Outcome outcome = shell("T=" + std::string(TORSIO_PROGRAM) + kTour);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err << contents("joint.txt");

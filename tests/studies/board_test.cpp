@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -106,6 +107,7 @@ TEST(BoardSets, HaveSourcesAndFilesWithHashes) {
 }
 
 TEST(BoardSources, AreLeftOutWithTheAddressOfWhatIsMissing) {
+  ::unsetenv("TORSIO_DATA");
   const TemporaryFolder folder;
   const BoardSource& source = source_of(find_board_set("emps", "test"));
   EXPECT_THAT(
@@ -114,7 +116,7 @@ TEST(BoardSources, AreLeftOutWithTheAddressOfWhatIsMissing) {
             HasSubstr("/emps with  tools/board_files ORIGINALS "), HasSubstr("(TORSIO_DATA is")));
   EXPECT_THAT(why_left_out(source, ""),
               HasSubstr("$TORSIO_DATA/emps with  tools/board_files ORIGINALS $TORSIO_DATA  "
-                        "(TORSIO_DATA is "));
+                        "(TORSIO_DATA is not set)"));
 }
 
 /// The message of the error that a call throws.

@@ -14,6 +14,7 @@
 #include "core/quantity.hpp"
 #include "files/whole_file.hpp"
 #include "link/connect_flags.hpp"
+#include "link/until_at_rest.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -24,7 +25,7 @@ namespace {
 using torsio::JointConnection;
 
 constexpr std::size_t kLargestModel_B = 64 << 20;
-constexpr std::chrono::seconds kLongestRest(3);
+constexpr double kLongestRest_s = 3.0;
 constexpr std::chrono::milliseconds kBetweenResets(50);
 
 struct CommandFlags : ConnectFlags {
@@ -71,16 +72,10 @@ void upload(const CommandFlags& flags, JointConnection& connection) {
 
 /// A joint that has found a fault comes to rest first, and refuses until then.
 void reset_when_at_rest(JointConnection& connection) {
-  const auto end = std::chrono::steady_clock::now() + kLongestRest;
-  for (;;) {
-    try {
-      return connection.reset_fault();
-    } catch (const torsio::Error&) {
-      if (std::chrono::steady_clock::now() > end) throw;
-      if (connection.information().state != torsio::LinkDriveState::fault) throw;
-    }
-    std::this_thread::sleep_for(kBetweenResets);
-  }
+  const bool is_fault = connection.information().state == torsio::LinkDriveState::fault;
+  until_at_rest(
+      is_fault ? kLongestRest_s : 0.0, [&] { connection.reset_fault(); },
+      [] { std::this_thread::sleep_for(kBetweenResets); });
 }
 
 void add_state_verbs(CLI::App& connect) {

@@ -16,6 +16,7 @@
 #include "core/quantity.hpp"
 #include "link/connect_flags.hpp"
 #include "link/telemetry_file.hpp"
+#include "link/until_at_rest.hpp"
 #include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -134,13 +135,10 @@ struct Played {
 
 /// What the joint found, if it has the register for it: "; its stop_cause is overload".
 std::string stop_cause(JointConnection& joint) {
-  constexpr const char* kRegister = "stop_cause";
   try {
-    const auto& all = joint.registers();
-    if (std::ranges::find(all, kRegister, &JointConnection::Register::name) == all.end()) return {};
-    return fmt::format("; its {} is {}", kRegister, torsio::text_of(joint.read(kRegister)));
+    return fmt::format("; its stop_cause is {}", torsio::text_of(joint.read("stop_cause")));
   } catch (const torsio::Error&) {
-    return {};  // the line, too, may have ended
+    return {};  // there is no such register, or the line has ended, too
   }
 }
 
@@ -187,16 +185,10 @@ Played play(JointConnection& joint, const PlayedReferences& references, double v
 /// Brings the joint to rest, and removes its power.
 void stop_and_disable(JointConnection& joint, const JointConnection::VisitTelemetry& visit) {
   joint.stop(torsio::StopCategory::ramp_and_brake);
-  torsio::MonotonicClock clock;
-  const std::int64_t end_ns = clock.now_ns() + static_cast<std::int64_t>(1e9 * kLongestStop_s);
-  for (;;) {
-    joint.poll(visit, 0.05);
-    try {
-      return joint.disable();
-    } catch (const torsio::Error&) {
-      if (clock.now_ns() > end_ns) throw;  // it is not at rest
-    }
-  }
+  const auto poll = [&] { joint.poll(visit, 0.05); };
+  poll();
+  until_at_rest(
+      kLongestStop_s, [&] { joint.disable(); }, poll);
 }
 
 void report(const PlayFlags& flags, const JointConnection& joint, const Played& played,
