@@ -1,4 +1,5 @@
 """Stores of studies for tools/fleet_trial and tools/slurm_cluster: a PostgreSQL server of their own, or a SQLite file."""
+import contextlib
 import os
 import pathlib
 import pwd
@@ -11,7 +12,7 @@ import urllib.parse
 
 
 class StoreDown(Exception):
-    """The server does not take a question now."""
+    """The server or the file does not take a question now."""
 
 
 def newest_programs():
@@ -92,15 +93,20 @@ class Postgresql:
 class Sqlite:
     """A file in a folder under /tmp."""
     name = "SQLite"
+    PATIENCE_S = 2.0
 
     def __init__(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="torsio-fleet-sqlite-", dir="/tmp"))
         self.url = str(self.folder / "studies.sqlite")
 
     def query(self, sql):
-        with sqlite3.connect(f"file:{urllib.parse.quote(self.url)}?mode=rw", uri=True, timeout=30.0) as connection:
-            rows = connection.execute(sql).fetchall()
-        connection.close()
+        """Rows of texts. Raises StoreDown if a process holds the whole file for PATIENCE_S, and if there are no tables yet."""
+        try:
+            with contextlib.closing(sqlite3.connect(f"file:{urllib.parse.quote(self.url)}?mode=rw", uri=True,
+                                                    timeout=self.PATIENCE_S)) as connection:
+                rows = connection.execute(sql).fetchall()
+        except sqlite3.OperationalError as error:
+            raise StoreDown(str(error)) from error
         return [["" if value is None else str(value) for value in row] for row in rows]
 
     def remove(self):
