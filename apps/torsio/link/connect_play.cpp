@@ -136,7 +136,8 @@ struct Played {
 /// What the joint found, if it has the register for it: "; its stop_cause is overload".
 std::string stop_cause(JointConnection& joint) {
   try {
-    return fmt::format("; its stop_cause is {}", torsio::text_of(joint.read("stop_cause")));
+    const std::string cause = torsio::text_of(joint.read("stop_cause"));
+    return cause == "none" ? "" : fmt::format("; its stop_cause is {}", cause);
   } catch (const torsio::Error&) {
     return {};  // there is no such register, or the line has ended, too
   }
