@@ -12,7 +12,7 @@ import urllib.parse
 
 
 class StoreDown(Exception):
-    """The server or the file does not take a question now."""
+    """The server does not take a question now, or a process holds the whole file."""
 
 
 def newest_programs():
@@ -72,8 +72,8 @@ class Postgresql:
         """mode: fast, or immediate, which is a crash that the next start recovers from."""
         self.call("pg_ctl", "-w", "-m", mode, "stop")
 
-    def query(self, sql):
-        """Rows of texts. Raises StoreDown."""
+    def query(self, sql, patience_s=None):
+        """Rows of texts. Raises StoreDown, and RuntimeError if the tables do not exist yet. Halted clients do not hold a server."""
         done = subprocess.run([self.programs / "psql", self.url, "-X", "-q", "-A", "-t", "-F", "\t", "-c", sql],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
         if done.returncode == 2:
@@ -93,20 +93,20 @@ class Postgresql:
 class Sqlite:
     """A file in a folder under /tmp."""
     name = "SQLite"
-    PATIENCE_S = 2.0
 
     def __init__(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="torsio-fleet-sqlite-", dir="/tmp"))
         self.url = str(self.folder / "studies.sqlite")
 
-    def query(self, sql):
-        """Rows of texts. Raises StoreDown if a process holds the whole file for PATIENCE_S, and if there are no tables yet."""
+    def query(self, sql, patience_s=30.0):
+        """Rows of texts. Raises StoreDown after patience_s, and RuntimeError if the file or its tables do not exist yet."""
         try:
             with contextlib.closing(sqlite3.connect(f"file:{urllib.parse.quote(self.url)}?mode=rw", uri=True,
-                                                    timeout=self.PATIENCE_S)) as connection:
+                                                    timeout=patience_s)) as connection:
                 rows = connection.execute(sql).fetchall()
         except sqlite3.OperationalError as error:
-            raise StoreDown(str(error)) from error
+            is_held = error.sqlite_errorcode & 0xff in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_PROTOCOL)
+            raise (StoreDown if is_held else RuntimeError)(str(error)) from error
         return [["" if value is None else str(value) for value in row] for row in rows]
 
     def remove(self):
