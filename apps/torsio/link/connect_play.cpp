@@ -133,7 +133,7 @@ struct Played {
   std::uint64_t missed = 0;  ///< periods of this program that began more than one period late
 };
 
-/// What the joint found, if it has the register for it: "; its stop_cause is overload".
+/// What the joint found, if it has the register for it and found something: "; its stop_cause is overload".
 std::string stop_cause(JointConnection& joint) {
   try {
     const std::string cause = torsio::text_of(joint.read("stop_cause"));
